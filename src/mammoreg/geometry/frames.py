@@ -1,0 +1,37 @@
+"""Maps between the patient (LPS), breast and plate frames; see the package docstring."""
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Laterality = Literal["L", "R"]
+Points = NDArray[np.float64]
+
+
+def lps_to_breast(points: Points, laterality: Laterality) -> Points:
+    """Map points (..., 3) in mm between LPS and the breast frame; the map is its own inverse."""
+    mirrored = np.array(points, dtype=float, copy=True)
+    if laterality == "L":
+        mirrored[..., 0] *= -1.0
+    return mirrored
+
+
+def plate_rotation(angle_deg: float) -> NDArray[np.float64]:
+    """Rotation (3, 3) from the breast to the plate frame at a projection angle in degrees.
+
+    Its rows are the plate axes in breast coordinates; the last one points from the breast to the source (contract,
+    Geometry: (-s sin a, 0, cos a) in LPS).
+    """
+    a = np.deg2rad(angle_deg)
+    return np.array([[np.cos(a), 0.0, -np.sin(a)], [0.0, 1.0, 0.0], [np.sin(a), 0.0, np.cos(a)]])
+
+
+def breast_to_plate(points: Points, angle_deg: float) -> Points:
+    """Turn points (..., 3) in mm from the breast into the plate frame."""
+    return np.asarray(points, dtype=float) @ plate_rotation(angle_deg).T
+
+
+def plate_to_breast(points: Points, angle_deg: float) -> Points:
+    """Turn points (..., 3) in mm from the plate into the breast frame."""
+    return np.asarray(points, dtype=float) @ plate_rotation(angle_deg)
