@@ -110,7 +110,8 @@ def test_a_projected_sphere_is_a_disc_of_the_magnified_size() -> None:
     method = MethodView(turned(0.0), view(0.0))
     centre = np.array([7.0, -30.0, 0.0])
     lesion = project_lesion(method, body_from_sphere(centre, 10.0))
-    assert lesion.area is not None and lesion.seen
+    assert lesion.area is not None
+    assert lesion.seen
     expected = method.project(centre[None])[0]
     np.testing.assert_allclose(lesion.centre, expected, atol=0.3)
     area_mm2 = lesion.area.pixels * (PIXEL_MM / method.geometry.middle_magnification) ** 2
@@ -143,12 +144,14 @@ def test_lesion_of_a_single_voxel_keeps_its_place() -> None:
 
 def test_what_lies_behind_the_edge_is_not_seen() -> None:
     method = MethodView(turned(0.0), view(0.0, edge_p_mm=-20.0))
-    pixels, seen = project_landmarks(method, np.array([[0.0, -21.0, 0.0], [0.0, -19.0, 0.0], [0.0, -300.0, 0.0]]))
+    _pixels, seen = project_landmarks(method, np.array([[0.0, -21.0, 0.0], [0.0, -19.0, 0.0], [0.0, -300.0, 0.0]]))
     assert seen.tolist() == [True, False, False]
     behind = project_lesion(method, body_from_sphere(np.array([0.0, -5.0, 0.0]), 8.0))
-    assert behind.area is None and not behind.seen
+    assert behind.area is None
+    assert not behind.seen
     across = project_lesion(method, body_from_sphere(np.array([0.0, -18.0, 0.0]), 8.0))
-    assert across.area is not None and not across.seen
+    assert across.area is not None
+    assert not across.seen
     assert across.area.first[0] == 0
 
 
@@ -158,8 +161,10 @@ def test_two_views_give_back_the_sphere(centre: list[float], diameter: float) ->
     methods = both_views()
     areas = {name: true_area(method, np.array(centre), diameter) for name, method in methods.items()}
     found = locate_in_breast({n: BreastInView(m, GRID) for n, m in methods.items()}, areas)
-    assert found.message == "" and found.region is not None
-    assert found.beam_gap_mm is not None and found.beam_gap_mm < 0.3
+    assert found.message == ""
+    assert found.region is not None
+    assert found.beam_gap_mm is not None
+    assert found.beam_gap_mm < 0.3
     np.testing.assert_allclose(found.point, centre, atol=0.5)
     cells = found.region.centres(found.region.data)
     radius = np.linalg.norm(cells - centre, axis=1)

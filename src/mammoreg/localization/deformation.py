@@ -37,7 +37,9 @@ class AffineDeformation:
 
     def inverse(self, points_plate: Points) -> Points:
         """See `Deformation.inverse`."""
-        return np.linalg.solve(self.matrix, (np.asarray(points_plate, dtype=float) - self.offset).T).T
+        return np.asarray(
+            np.linalg.solve(self.matrix, (np.asarray(points_plate, dtype=float) - self.offset).T).T, float
+        )
 
 
 class ReferenceMesh:

@@ -29,7 +29,7 @@ class BreastGrid:
     @cached_property
     def blocks(self) -> Cells:
         """Blocks (N, 3) that hold at least one voxel of the breast."""
-        return np.unique(np.argwhere(np.asarray(self.breast.data) != 0) // 2, axis=0)
+        return np.asarray(np.unique(np.argwhere(np.asarray(self.breast.data) != 0) // 2, axis=0), dtype=np.intp)
 
     @cached_property
     def block_centres(self) -> Points:
@@ -50,7 +50,7 @@ class BreastGrid:
         corners = np.stack(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij"), axis=-1).reshape(-1, 3)
         halves = (2 * cells[:, None, :] + corners).reshape(-1, 3)
         if level >= 0:
-            return halves
+            return np.asarray(halves, dtype=np.intp)
         halves = halves[np.all(halves < self.breast.shape, axis=1)]
         return np.asarray(halves[np.asarray(self.breast.data)[tuple(halves.T)] != 0])
 

@@ -44,7 +44,7 @@ class LesionArea:
     def centre(self) -> NDArray[np.float64]:
         """Centroid (column, row) of the pixels in the whole image."""
         rows, columns = np.nonzero(self.mask)
-        return np.array([columns.mean(), rows.mean()]) + np.array(self.first, dtype=float)
+        return np.asarray([columns.mean() + self.first[0], rows.mean() + self.first[1]])
 
     @property
     def pixels(self) -> int:

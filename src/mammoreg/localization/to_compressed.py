@@ -50,9 +50,11 @@ def fit_surface_to_mask(surface: Points, mask: Volume, *, rotate: bool) -> Affin
         index = distance.to_index(motion(parameters).forward(surface))
         held = np.clip(index, 0, last)
         beyond = np.linalg.norm((index - held) * distance.spacing, axis=1)
-        return distance.sample(distance.to_world(held)) + beyond
+        return np.asarray(distance.sample(distance.to_world(held)) + beyond, dtype=float)
 
     start = np.zeros(6 if rotate else 3)
     scale = np.array([1.0] * 3 + [0.02] * (len(start) - 3))
-    found = optimize.least_squares(misfit, start, loss="soft_l1", f_scale=_ROBUST_MM, x_scale=scale, diff_step=1e-3)
+    found = optimize.least_squares(
+        misfit, start, loss="soft_l1", f_scale=_ROBUST_MM, x_scale=scale, diff_step=np.full(len(start), 1e-3)
+    )
     return motion(found.x)

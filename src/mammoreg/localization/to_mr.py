@@ -103,7 +103,7 @@ def closest_approach(first: Points, second: Points) -> tuple[Points, float]:
     for _ in range(3):
         gap, partner = cKDTree(b).query(a)
         i = int(np.argmin(gap))
-        j = int(partner[i])
+        j = int(np.asarray(partner)[i])
         pair = a[i], b[j]
         a, b = _around(a, i), _around(b, j)
     return 0.5 * (pair[0] + pair[1]), float(np.linalg.norm(pair[0] - pair[1]))
@@ -127,7 +127,7 @@ def back_projected_region(tubes: list[tuple[BreastInView, LesionArea]]) -> Volum
     grid, last = tubes[0][0].grid, _last_level(tubes)
     near = [_Nearness(view, area) for view, area in tubes]
     cells, level = grid.blocks, -1
-    keep = np.all([n.within(n.view.pixels, grid.spacing(-1)) for n in near], axis=0)
+    keep = _all_of([n.within(n.view.pixels, grid.spacing(-1)) for n in near])
     while level < last and keep.any():
         cells, level = grid.children(cells[keep], level), level + 1
         keep = _cells_kept(grid, cells, level, near, exact=level == last)
@@ -138,8 +138,12 @@ def _cells_kept(grid: BreastGrid, cells: Cells, level: int, near: list["_Nearnes
     points = grid.centres(cells, level)
     pixels = [n.view.method.project(points) for n in near]
     if exact:
-        return np.all([n.area.contains(p) for n, p in zip(near, pixels, strict=True)], axis=0)
-    return np.all([n.within(p, grid.spacing(level)) for n, p in zip(near, pixels, strict=True)], axis=0)
+        return _all_of([n.area.contains(p) for n, p in zip(near, pixels, strict=True)])
+    return _all_of([n.within(p, grid.spacing(level)) for n, p in zip(near, pixels, strict=True)])
+
+
+def _all_of(tests: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    return np.asarray(np.all(tests, axis=0))
 
 
 def _last_level(tubes: list[tuple[BreastInView, LesionArea]]) -> int:
