@@ -1,0 +1,1 @@
+"""Measures of a registration (contract, Measures) and the paper's own results."""
