@@ -1,0 +1,1 @@
+"""Image analysis: MR segmentation and the reading of mammograms, on arrays."""

@@ -1,0 +1,91 @@
+"""Canonical mammograms: one orientation, dense tissue bright."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mammoreg.errors import DataError
+from mammoreg.geometry.frames import Laterality
+from mammoreg.imaging.mammogram_air import Air, find_air
+from mammoreg.imaging.mammogram_orientation import Flips, View, flips_of_orientation
+
+
+@dataclass(frozen=True)
+class CanonicalMammogram:
+    """A mammogram in canonical orientation and polarity.
+
+    Attributes:
+        pixels: float32 (rows, columns), bright = dense, grows with attenuation.
+        air: level and noise of the air in `pixels`.
+        flips: between stored and canonical orientation.
+        estimated: names of what the header did not give.
+        flags: what the image says against the header.
+    """
+
+    pixels: NDArray[np.float32]
+    air: Air
+    flips: Flips
+    estimated: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+def canonicalise(
+    stored: NDArray[Any],
+    laterality: Laterality,
+    view: View,
+    *,
+    orientation: str | None = None,
+    photometric: str | None = None,
+    linear: bool = False,
+) -> CanonicalMammogram:
+    """Bring a stored mammogram into canonical orientation and polarity.
+
+    Parameters
+    ----------
+    stored : pixels as stored, (rows, columns).
+    orientation : PatientOrientation, or None: then the image's air tells the chest-wall side, and rows are taken to
+        run as usually stored, towards medial.
+    photometric : PhotometricInterpretation, or None: then the air at the border decides.
+    linear : True where grey values are proportional to exposure (unprocessed detector data), which takes a logarithm.
+
+    Raises
+    ------
+    DataError
+        If no breast is seen, or the image's chest-wall side contradicts its orientation.
+    """
+    air = find_air(stored)
+    flips = _flips(air, orientation, laterality, view)
+    pixels = _dense_bright(np.asarray(stored, dtype=np.float32), air, linear)
+    flags = ("polarity contradicts the air at the border",) if _contradicts(photometric, air, linear) else ()
+    missing = {"orientation": orientation, "polarity": photometric}
+    canonical = np.asarray(flips.apply(pixels), dtype=np.float32)
+    estimated = tuple(name for name, value in missing.items() if value is None)
+    return CanonicalMammogram(canonical, find_air(canonical), flips, estimated, flags)
+
+
+def _flips(air: Air, orientation: str | None, laterality: Laterality, view: View) -> Flips:
+    if orientation is None:
+        return Flips(rows=False, columns=air.side == "left")
+    flips = flips_of_orientation(orientation, laterality, view)
+    if flips.chest_wall_side == air.side:
+        raise DataError(
+            f"orientation {orientation!r} puts the chest wall at the {flips.chest_wall_side} edge of the image, which "
+            "shows air; correct the orientation or the image"
+        )
+    return flips
+
+
+def _contradicts(photometric: str | None, air: Air, linear: bool) -> bool:
+    if photometric is None or linear:
+        return False
+    return air.bright != (photometric.strip().upper() == "MONOCHROME1")
+
+
+def _dense_bright(pixels: NDArray[np.float32], air: Air, linear: bool) -> NDArray[np.float32]:
+    if linear and air.bright:
+        return -np.log(np.maximum(pixels, 1.0) / np.float32(max(air.level, 1.0)))
+    if air.bright:
+        return pixels.max() - pixels
+    return pixels
