@@ -39,10 +39,8 @@ def find_air(pixels: NDArray[Any]) -> Air:
 
     The edge with the smaller spread of grey values is the nipple's side: it shows little but air.
 
-    Raises
-    ------
-    DataError
-        If the image is not finite, or shows no breast: nothing stands out from the air.
+    Raises:
+        DataError: If the image is not finite, or shows no breast: nothing stands out from the air.
     """
     image = np.asarray(pixels, dtype=np.float32)
     if image.ndim != 2 or min(image.shape) < 16:

@@ -30,10 +30,8 @@ def edge_level(pixels: Pixels, air: Air) -> float:
 def breast_mask(smooth: Pixels, level: float, pixel_mm: float) -> NDArray[np.bool_]:
     """Mask (rows, columns) of the largest connected region above a level, filled; text and markers are left out.
 
-    Raises
-    ------
-    DataError
-        If no region of at least 5 cm2 stands out, or it does not come near the chest-wall edge (column 0).
+    Raises:
+        DataError: If no region of at least 5 cm2 stands out, or it does not come near the chest-wall edge (column 0).
     """
     labels, count = ndimage.label(smooth > level)
     sizes = np.bincount(labels.ravel(), minlength=2)[1:]

@@ -42,18 +42,15 @@ def canonicalise(
 ) -> CanonicalMammogram:
     """Bring a stored mammogram into canonical orientation and polarity.
 
-    Parameters
-    ----------
-    stored : pixels as stored, (rows, columns).
-    orientation : PatientOrientation, or None: then the image's air tells the chest-wall side, and rows are taken to
-        run as usually stored, towards medial.
-    photometric : PhotometricInterpretation, or None: then the air at the border decides.
-    linear : True where grey values are proportional to exposure (unprocessed detector data), which takes a logarithm.
+    Args:
+        stored: pixels as stored, (rows, columns).
+        orientation: PatientOrientation, or None: then the image's air tells the chest-wall side, and rows are taken to
+            run as usually stored, towards medial.
+        photometric: PhotometricInterpretation, or None: then the air at the border decides.
+        linear: True where grey values are proportional to exposure (unprocessed detector data), which takes a logarithm.
 
-    Raises
-    ------
-    DataError
-        If no breast is seen, or the image's chest-wall side contradicts its orientation.
+    Raises:
+        DataError: If no breast is seen, or the image's chest-wall side contradicts its orientation.
     """
     air = find_air(stored)
     flips = _flips(air, orientation, laterality, view)
@@ -85,7 +82,7 @@ def _contradicts(photometric: str | None, air: Air, linear: bool) -> bool:
 
 def _dense_bright(pixels: NDArray[np.float32], air: Air, linear: bool) -> NDArray[np.float32]:
     if linear and air.bright:
-        return -np.log(np.maximum(pixels, 1.0) / np.float32(max(air.level, 1.0)))
+        return np.asarray(np.log(max(air.level, 1.0)) - np.log(np.maximum(pixels, 1.0)), dtype=np.float32)
     if air.bright:
-        return pixels.max() - pixels
+        return np.asarray(pixels.max() - pixels, dtype=np.float32)
     return pixels

@@ -48,14 +48,11 @@ class Flips:
 def flips_of_orientation(orientation: str, laterality: Laterality, view: View) -> Flips:
     r"""Decide the flips from PatientOrientation, side and view (contract, Geometry).
 
-    Parameters
-    ----------
-    orientation : row direction and column direction as stored, such as ``A\FR``; one letter of each is enough.
+    Args:
+        orientation: row direction and column direction as stored, such as ``A\FR``; one letter of each is enough.
 
-    Raises
-    ------
-    DataError
-        If the value cannot be read, the image is stored turned by 90 degrees, or its letters contradict the side.
+    Raises:
+        DataError: If the value cannot be read, the image is stored turned by 90 degrees, or its letters contradict the side.
     """
     row_letters, column_letters = _two_directions(orientation)
     if not set(row_letters) & {"A", "P"}:

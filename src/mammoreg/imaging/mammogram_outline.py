@@ -20,10 +20,8 @@ def outline_polyline(
 ) -> NDArray[np.float64]:
     """Smooth polyline (M, 2) of (column, row) between skin and air, 1 mm apart, from its low-row to its high-row end.
 
-    Raises
-    ------
-    DataError
-        If the breast shows no edge against air.
+    Raises:
+        DataError: If the breast shows no edge against air.
     """
     contour = _longest_contour(_only_breast(smooth, mask, air, pixel_mm), level)
     contour = _open_at_chest_wall(contour, _MARGIN_MM / pixel_mm)
@@ -39,11 +37,10 @@ def outline_weight(
 ) -> NDArray[np.float64]:
     """Weight (M,): 1 where the outline is skin, fading to 0 over the last 10 mm before chest wall, border, pectoral.
 
-    Parameters
-    ----------
-    outline : (M, 2) of (column, row).
-    mask : breast mask; its first column is where the breast's image begins.
-    pectoral : mask of the pectoral muscle, or None.
+    Args:
+        outline: (M, 2) of (column, row).
+        mask: breast mask; its first column is where the breast's image begins.
+        pectoral: mask of the pectoral muscle, or None.
     """
     rows, columns = mask.shape
     first = int(np.flatnonzero(mask.any(axis=0))[0])
@@ -74,7 +71,7 @@ def _open_at_chest_wall(contour: NDArray[np.float64], margin: float) -> NDArray[
     if np.any(contour[0] != contour[-1]):
         return contour
     ring = np.roll(contour[:-1], -int(np.argmin(contour[:-1, 0])), axis=0)
-    return ring[ring[:, 0] > ring[:, 0].min() + margin]
+    return np.asarray(ring[ring[:, 0] > ring[:, 0].min() + margin], dtype=float)
 
 
 def _smooth_polyline(contour: NDArray[np.float64], pixel_mm: float) -> NDArray[np.float64]:

@@ -22,11 +22,10 @@ def pectoral_mask(pixels: Pixels, mask: NDArray[np.bool_], pixel_mm: float) -> N
     A straight edge with the largest mean drop of brightness away from the corner is searched, then bent to the image
     by a shortest path within 8 mm of it.
 
-    Parameters
-    ----------
-    pixels : canonical image (rows, columns).
-    mask : breast mask of the same shape.
-    pixel_mm : pixel spacing in mm.
+    Args:
+        pixels: canonical image (rows, columns).
+        mask: breast mask of the same shape.
+        pixel_mm: pixel spacing in mm.
     """
     factor = max(1, round(_GRID_MM / pixel_mm))
     grid_mm = factor * pixel_mm
