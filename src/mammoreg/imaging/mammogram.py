@@ -43,7 +43,7 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
         pixel_mm: pixel spacing at the detector in mm.
 
     Raises:
-        mammoreg.errors.DataError: If no breast is found, it lies away from the chest wall, or it has no edge against air.
+        DataError: If no breast is found, it lies away from the chest wall, or it has no edge against air.
     """
     factor = max(1, int(_WORKING_PIXEL_MM / pixel_mm + 1e-6))
     image = _reduced(np.asarray(pixels, dtype=np.float32), factor)

@@ -47,7 +47,7 @@ def canonicalise(
         orientation: PatientOrientation, or None: then the image's air tells the chest-wall side, and rows are taken to
             run as usually stored, towards medial.
         photometric: PhotometricInterpretation, or None: then the air at the border decides.
-        linear: True where grey values are proportional to exposure (unprocessed detector data), which takes a logarithm.
+        linear: True where grey values are proportional to exposure (unprocessed data), which takes a logarithm.
 
     Raises:
         DataError: If no breast is seen, or the image's chest-wall side contradicts its orientation.

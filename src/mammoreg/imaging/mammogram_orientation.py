@@ -52,7 +52,7 @@ def flips_of_orientation(orientation: str, laterality: Laterality, view: View) -
         orientation: row direction and column direction as stored, such as ``A\FR``; one letter of each is enough.
 
     Raises:
-        DataError: If the value cannot be read, the image is stored turned by 90 degrees, or its letters contradict the side.
+        DataError: If the value cannot be read, the image is turned by 90 degrees, or its letters contradict the side.
     """
     row_letters, column_letters = _two_directions(orientation)
     if not set(row_letters) & {"A", "P"}:
