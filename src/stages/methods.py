@@ -24,13 +24,16 @@ def of_view(artefacts: Sequence[Artefact], view: str) -> Artefact | None:
 
 
 def view_geometry(pose: Artefact, method: str | None = None) -> ViewGeometry:
-    """Geometry of a view; `rigid` has its own angle and place, and parallel beams (contract, method `rigid`)."""
+    """Geometry of a view; `rigid` has its own angle and place, and parallel beams (contract, method `rigid`).
+
+    The silhouette of a second volume, view 3D, is one of parallel beams for every method.
+    """
     rigid = method == "rigid"
+    parallel = rigid or pose.view == "3D"
     placed = {name: float(pose.value(f"rigid_{name}" if rigid else name)) for name in _OF_METHOD}
     shared = {name: float(pose.value(name)) for name in _OF_VIEW}
-    return ViewGeometry(
-        **placed, **shared, rows=int(pose.value("rows")), columns=int(pose.value("columns")), parallel=rigid
-    )
+    rows, columns = int(pose.value("rows")), int(pose.value("columns"))
+    return ViewGeometry(**placed, **shared, rows=rows, columns=columns, parallel=parallel)
 
 
 def block_mesh(mesh: Artefact) -> BlockMesh:

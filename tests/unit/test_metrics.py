@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mammoreg.geometry import ViewGeometry, Volume
-from mammoreg.localization.lesions import LesionArea, area_from_disc
+from mammoreg.localization.lesions import LesionArea, MaskLesion, SphereLesion, area_from_disc
 from mammoreg.metrics.distances import detector_distance_mm, distance_to_curve_mm
 from mammoreg.metrics.elongation import extents_mm
-from mammoreg.metrics.overlap import overlap_of_areas, overlap_of_sizes, overlap_with_mask, overlap_with_sphere
+from mammoreg.metrics.overlap import overlap_of_areas, overlap_of_sizes, overlap_of_volumes
 from mammoreg.metrics.paper import METHODS, TABLE_5, TABLE_6, PaperRow, paper_overlap_percent, paper_summary
 from mammoreg.metrics.summary import summarise
 from tests.shared_data import DATA, requires_shared
@@ -37,7 +37,7 @@ def test_coverage_is_not_dice() -> None:
 
 def test_nothing_predicted_overlaps_nothing() -> None:
     assert overlap_of_areas(None, block((0, 0))).overlap_percent == 0.0
-    assert overlap_with_sphere(None, np.zeros(3), 8.0).dice == 0.0
+    assert overlap_of_volumes(None, SphereLesion(np.zeros(3), 8.0)).dice == 0.0
 
 
 @given(st.integers(-12, 12), st.integers(-12, 12))
@@ -59,16 +59,16 @@ def cube(side_mm: float, spacing: float, centre: np.ndarray) -> Volume:
 
 def test_volumes_on_different_grids() -> None:
     fine, coarse = cube(8.0, 0.5, np.array([4.0, 0.0, 0.0])), cube(8.0, 2.0, np.zeros(3))
-    found = overlap_with_mask(fine, coarse)
+    found = overlap_of_volumes(fine, MaskLesion(coarse))
     assert found.overlap_percent == pytest.approx(50.0)
     assert found.dice == pytest.approx(0.5)
     assert found.size_ratio == pytest.approx(1.0)
-    far = overlap_with_mask(cube(8.0, 0.5, np.full(3, 100.0)), coarse)
+    far = overlap_of_volumes(cube(8.0, 0.5, np.full(3, 100.0)), MaskLesion(coarse))
     assert far.overlap_percent == 0.0
 
 
 def test_cube_around_a_sphere() -> None:
-    found = overlap_with_sphere(cube(10.0, 0.25, np.zeros(3)), np.zeros(3), 10.0)
+    found = overlap_of_volumes(cube(10.0, 0.25, np.zeros(3)), SphereLesion(np.zeros(3), 10.0))
     assert found.overlap_percent == pytest.approx(100.0, abs=1.0)
     assert found.size_ratio == pytest.approx(6 / np.pi, rel=1e-6)
 

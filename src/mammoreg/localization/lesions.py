@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
+from mammoreg.geometry import Volume, lps_to_breast
+from mammoreg.geometry.frames import Laterality, Points
 
 _MOST_POINTS = 20_000
 _FINEST_STEP_MM = 0.25
@@ -26,6 +26,66 @@ class LesionBody:
     points: Points
     step_mm: float
     centre: Points
+
+
+@dataclass(frozen=True)
+class MaskLesion:
+    """A lesion of the MR volume as a mask (non-zero = lesion), and its body."""
+
+    mask: Volume
+
+    @property
+    def centre(self) -> Points:
+        """Centroid (3,) of the mask's voxels, mm."""
+        return np.asarray(self.mask.centres(np.asarray(self.mask.data) != 0).mean(axis=0))
+
+    @property
+    def volume_mm3(self) -> float:
+        """Volume of the mask's voxels."""
+        return float(np.count_nonzero(self.mask.data)) * self.mask.voxel_mm3
+
+    def between_lps_and_breast(self, laterality: Laterality) -> "MaskLesion":
+        """The lesion in the other of the two frames."""
+        return MaskLesion(self.mask.between_lps_and_breast(laterality))
+
+    def body(self) -> LesionBody:
+        """Points that fill the mask."""
+        return body_from_mask(self.mask)
+
+    def contains(self, points: Points) -> NDArray[np.bool_]:
+        """Whether points (N, 3), mm, lie in one of the mask's voxels."""
+        index = np.rint(self.mask.to_index(points)).astype(np.intp)
+        found = np.all((index >= 0) & (index < self.mask.shape), axis=1)
+        found[found] = np.asarray(self.mask.data)[tuple(index[found].T)] != 0
+        return np.asarray(found)
+
+
+@dataclass(frozen=True)
+class SphereLesion:
+    """A lesion of the MR volume as centre (3,) and diameter, mm."""
+
+    centre: Points
+    diameter_mm: float
+
+    @property
+    def volume_mm3(self) -> float:
+        """Volume of the sphere."""
+        return float(np.pi / 6.0 * self.diameter_mm**3)
+
+    def between_lps_and_breast(self, laterality: Laterality) -> "SphereLesion":
+        """The lesion in the other of the two frames."""
+        return SphereLesion(lps_to_breast(self.centre, laterality), self.diameter_mm)
+
+    def body(self) -> LesionBody:
+        """Points that fill the sphere."""
+        return body_from_sphere(self.centre, self.diameter_mm)
+
+    def contains(self, points: Points) -> NDArray[np.bool_]:
+        """Whether points (N, 3), mm, lie in the sphere."""
+        return np.asarray(np.linalg.norm(points - self.centre, axis=1) <= 0.5 * self.diameter_mm)
+
+
+MrLesion = MaskLesion | SphereLesion
 
 
 @dataclass(frozen=True)

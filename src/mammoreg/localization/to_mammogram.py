@@ -18,8 +18,8 @@ class ProjectedLesion:
 
     Attributes:
         area: the projected area, cut at the image's border; None where nothing of it is imaged.
-        centre: centroid (column, row) of the whole projected area, canonical image.
-        seen: whether that centroid lies in the image.
+        centre: centroid (column, row) of the area's pixels, canonical image; without them of the whole projection.
+        seen: whether the centroid of the whole projection lies in the image.
     """
 
     area: LesionArea | None
@@ -53,7 +53,7 @@ def project_lesion(method: MethodView, body: LesionBody) -> ProjectedLesion:
     rows, columns = np.nonzero(image)
     top, left = int(rows.min()), int(columns.min())
     area = LesionArea(image[top : rows.max() + 1, left : columns.max() + 1], (left, top))
-    return ProjectedLesion(area, whole.centre, bool(in_image(whole.centre, geometry)))
+    return ProjectedLesion(area, area.centre, bool(in_image(whole.centre, geometry)))
 
 
 def fill_area(pixels: NDArray[np.float64], step_px: float) -> LesionArea:

@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mammoreg.geometry import Volume
-from mammoreg.localization.lesions import LesionArea
+from mammoreg.localization.lesions import LesionArea, MrLesion
 
 
 @dataclass(frozen=True)
@@ -44,23 +43,10 @@ def overlap_of_areas(predicted: LesionArea | None, true: LesionArea) -> Overlap:
     return overlap_of_sizes(predicted.pixels, true.pixels, int(np.count_nonzero(true.contains(pixels))))
 
 
-def overlap_with_mask(region: Volume | None, true: Volume) -> Overlap:
-    """Overlap of a region with a mask on another grid of the same frame; each region cell asks the mask's voxel."""
-    true_mm3 = float(np.count_nonzero(true.data)) * true.voxel_mm3
+def overlap_of_volumes(region: Volume | None, true: MrLesion) -> Overlap:
+    """Overlap of a region's cells (non-zero) with a lesion of the same frame; no region overlaps by 0."""
     if region is None:
-        return overlap_of_sizes(0.0, true_mm3, 0.0)
+        return overlap_of_sizes(0.0, true.volume_mm3, 0.0)
     cells = region.centres(np.asarray(region.data) != 0)
-    index = np.rint(true.to_index(cells)).astype(np.intp)
-    inside = np.all((index >= 0) & (index < true.shape), axis=1)
-    held = np.asarray(true.data)[tuple(index[inside].T)] != 0
-    return overlap_of_sizes(len(cells) * region.voxel_mm3, true_mm3, float(np.count_nonzero(held)) * region.voxel_mm3)
-
-
-def overlap_with_sphere(region: Volume | None, centre: NDArray[np.float64], diameter_mm: float) -> Overlap:
-    """Overlap of a region with a sphere of the same frame."""
-    true_mm3 = np.pi / 6.0 * diameter_mm**3
-    if region is None:
-        return overlap_of_sizes(0.0, true_mm3, 0.0)
-    cells = region.centres(np.asarray(region.data) != 0)
-    held = np.linalg.norm(cells - centre, axis=1) <= 0.5 * diameter_mm
-    return overlap_of_sizes(len(cells) * region.voxel_mm3, true_mm3, float(np.count_nonzero(held)) * region.voxel_mm3)
+    shared = float(np.count_nonzero(true.contains(cells)))
+    return overlap_of_sizes(len(cells) * region.voxel_mm3, true.volume_mm3, shared * region.voxel_mm3)

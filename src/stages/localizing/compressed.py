@@ -1,0 +1,59 @@
+"""Into the compressed MR volume: landmarks carried by each method, placed by that volume's outline alone."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from mammoreg.geometry import Volume, lps_to_breast, plate_to_breast
+from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.localization.deformation import MethodView
+from mammoreg.localization.to_compressed import fit_surface_to_mask
+from stages.artefact import Fields
+from stages.localizing.views import CaseViews
+from stages.methods import METHODS
+
+
+def predict_in_compressed(
+    views: CaseViews, compressed: Volume, skin: Points, landmarks: Mapping[str, Points], laterality: Laterality
+) -> Fields:
+    """Rows `compressed_rows` (LPS).
+
+    Without a mammogram the plates stand in the second volume's frame already; with one the deformed breast is only
+    shifted to that volume's outline. `rigid` is the best rigid fit of the undeformed skin to it.
+
+    Args:
+        views: of the case.
+        compressed: mask of the body between the plates, breast frame.
+        skin: points (N, 3) on the undeformed skin, breast frame, mm.
+        landmarks: points (3,) of the undeformed volume by name, breast frame.
+    """
+    view = next((v for v in ("3D", "CC", "MLO") if v in views.methods), None)
+    rows: list[dict[str, Any]] = []
+    points = np.array(list(landmarks.values())).reshape(-1, 3)
+    for method in METHODS if view and len(points) else ():
+        if method == "rigid":
+            carried = fit_surface_to_mask(skin, compressed, rotate=True).forward(points)
+        elif method in views.methods[str(view)]:
+            carried = _carried(views.methods[str(view)][method], view == "3D", compressed, skin, points)
+        else:
+            carried = np.full(points.shape, np.nan)
+        rows += _rows(method, list(landmarks), lps_to_breast(carried, laterality))
+    return Fields(values={"compressed_rows": rows})
+
+
+def _carried(way: MethodView, placed: bool, compressed: Volume, skin: Points, points: Points) -> Points:
+    """Points (N, 3) between the plates, breast frame, shifted to the outline unless they are placed already."""
+    angle = way.geometry.angle_deg
+    carried = plate_to_breast(way.deformation.forward(points), angle)
+    if placed:
+        return carried
+    surface = plate_to_breast(way.deformation.forward(skin), angle)
+    return fit_surface_to_mask(surface, compressed, rotate=False).forward(carried)
+
+
+def _rows(method: str, names: list[str], points: Points) -> list[dict[str, Any]]:
+    return [
+        {"method": method, "name": name, **dict(zip("xyz", map(float, point), strict=True))}
+        for name, point in zip(names, points, strict=True)
+    ]
