@@ -11,15 +11,15 @@ class Fault:
     Attributes:
         where: file, row and key, as the user would look them up.
         what: what is wrong, with the offending value.
-        remedy: what to do about it.
+        remedy: what to do about it; empty where `what` says so already.
     """
 
     where: str
     what: str
-    remedy: str
+    remedy: str = ""
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.what}; {self.remedy}"
+        return f"{self.where}: {self.what}" + (f"; {self.remedy}" if self.remedy else "")
 
 
 class UserError(Exception):
