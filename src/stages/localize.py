@@ -14,10 +14,11 @@ from stages.localizing.compressed import predict_in_compressed
 from stages.localizing.mammogram import predict_in_mammograms
 from stages.localizing.mr import Anatomy, predict_in_mr
 from stages.localizing.views import CaseViews, case_views
-from stages.marks import mr_landmarks, mr_lesions, view_areas
+from stages.marks import mr_landmarks, mr_lesions, view_areas, view_lesion_names
 from stages.methods import block_mesh
 
 _SKIN_PARTS = 6
+_SKIN_PARTS_OF_FIT = 2
 
 
 class Settings(SettingsModel):
@@ -35,11 +36,10 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     poses = [a for a in per_view if a.stage == "pose"]
     solutions = [a for a in per_view if a.stage != "pose"]
     views = case_views(poses, solutions, ReferenceMesh(block.points, block.hexes()))
-    skin = _skin(block)
     parts = [
         _to_mammograms(inputs, views, segment.laterality),
-        _to_mr(inputs, views, segment, skin),
-        _to_compressed(inputs, views, segment, skin),
+        _to_mr(inputs, views, segment, _skin(block, _SKIN_PARTS)),
+        _to_compressed(inputs, views, segment, _skin(block, _SKIN_PARTS_OF_FIT)),
     ]
     return _joined(parts, per_view)
 
@@ -61,8 +61,8 @@ def _to_mr(inputs: Inputs, views: CaseViews, segment: Artefact, skin: Points) ->
         skin,
         lps_to_breast(segment.array("chest_wall_surface", "mm"), side),
     )
-    areas = {view: view_areas(inputs, pose) for view, pose in views.poses.items()}
-    return predict_in_mr(views, anatomy, {view: found for view, found in areas.items() if found})
+    names_of = {view: view_lesion_names(inputs, view) for view in views.imaged}
+    return predict_in_mr(views, anatomy, names_of, {v: view_areas(inputs, pose) for v, pose in views.poses.items()})
 
 
 def _to_compressed(inputs: Inputs, views: CaseViews, segment: Artefact, skin: Points) -> Fields:
@@ -78,8 +78,8 @@ def _landmarks(inputs: Inputs, laterality: Laterality) -> dict[str, Points]:
     return {name: lps_to_breast(point, laterality) for name, point in mr_landmarks(inputs).items()}
 
 
-def _skin(block: BlockMesh) -> Points:
-    fine = block.subdivide(_SKIN_PARTS)
+def _skin(block: BlockMesh, parts: int) -> Points:
+    fine = block.subdivide(parts)
     return np.asarray(fine.points[fine.skin_nodes()])
 
 

@@ -11,7 +11,7 @@ from mammoreg.localization.anatomy import clock_position
 from mammoreg.localization.deformation import AffineDeformation, MeshDeformation, MethodView, ReferenceMesh
 from mammoreg.localization.grid import BreastGrid, BreastInView
 from mammoreg.localization.lesions import LesionArea, area_from_disc, area_from_mask, body_from_mask, body_from_sphere
-from mammoreg.localization.to_compressed import fit_surface_to_mask, signed_distance
+from mammoreg.localization.to_compressed import fit_surface_to_outline, signed_distance
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
 from mammoreg.localization.to_mr import closest_approach, halfway, locate_in_breast
 from mammoreg.meshing.block import BlockMesh
@@ -96,6 +96,13 @@ def test_mesh_deformation_is_exact_for_affine_nodes_and_nan_outside() -> None:
     just_outside = np.array([[20.5, -20.0, 0.0], [0.0, -41.0, 0.0]])
     np.testing.assert_allclose(deformation.forward(just_outside), affine.forward(just_outside), atol=1e-6)
     assert np.isnan(deformation.inverse(affine.forward(just_outside))).all()
+
+
+def test_points_far_outside_the_mesh_stay_outside() -> None:
+    mesh, turn = box_mesh(), turned(20.0)
+    deformation = MeshDeformation(ReferenceMesh(mesh.points, mesh.hexes()), turn.forward(mesh.points))
+    far = np.array([[0.0, 60.0, 5.0], [70.0, -10.0, 0.0], [-30.0, -80.0, -40.0]])
+    np.testing.assert_allclose(deformation.forward(far), turn.forward(far), atol=1e-6)
 
 
 def test_reference_mesh_asked_again_for_other_points_of_the_same_number() -> None:
@@ -278,7 +285,9 @@ def ellipsoid_mask(radii: tuple[float, float, float], shift: np.ndarray, turn: n
 
 def test_outline_fit_recovers_a_shift() -> None:
     radii, shift = (60.0, 70.0, 40.0), np.array([3.0, -4.0, 5.0])
-    placed = fit_surface_to_mask(skin_points(radii), ellipsoid_mask(radii, shift, np.eye(3)), rotate=False)
+    placed = fit_surface_to_outline(
+        skin_points(radii), signed_distance(ellipsoid_mask(radii, shift, np.eye(3))), rotate=False
+    )
     np.testing.assert_allclose(placed.matrix, np.eye(3))
     np.testing.assert_allclose(placed.offset, shift, atol=0.4)
 
@@ -287,7 +296,7 @@ def test_outline_fit_recovers_a_turn() -> None:
     radii, shift = (60.0, 70.0, 40.0), np.array([2.0, -3.0, 4.0])
     turn = plate_rotation(8.0)
     points = skin_points(radii)
-    placed = fit_surface_to_mask(points, ellipsoid_mask(radii, shift, turn), rotate=True)
+    placed = fit_surface_to_outline(points, signed_distance(ellipsoid_mask(radii, shift, turn)), rotate=True)
     inner = 0.5 * points
     assert np.linalg.norm(placed.forward(inner) - (inner @ turn.T + shift), axis=1).max() < 1.0
 

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.locate import Locator, interpolate
+from mammoreg.meshing.trilinear import shape_gradients
+
+_FAR_MM = 1e-3
 
 
 class Deformation(Protocol):
@@ -55,12 +58,32 @@ class ReferenceMesh:
         self._asked: Points | None = None
         self._located: tuple[NDArray[np.intp], Points] | None = None
 
-    def carry(self, points: Points, nodal_values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Interpolate nodal values (nodes, 3) at points (N, 3); outside the mesh the nearest element extrapolates."""
+    def locate(self, points: Points) -> tuple[NDArray[np.intp], Points]:
+        """Element (N,) and local coordinates (N, 3) of points (N, 3); see `Locator.locate` for those outside."""
         if self._located is None or self._asked is None or not np.array_equal(self._asked, points):
             element, local, _ = self._locator.locate(points)
             self._asked, self._located = np.array(points, dtype=float), (element, local)
-        return interpolate(self.hexes, *self._located, nodal_values)
+        return self._located
+
+    def carry(self, points: Points, deformed: Points) -> Points:
+        """Carry points (N, 3) with the nodes; what lies beyond the extrapolated elements turns with the nearest."""
+        element, local = self.locate(points)
+        carried = np.asarray(interpolate(self.hexes, element, local, deformed))
+        beyond = points - interpolate(self.hexes, element, local, self.points)
+        far = np.flatnonzero(np.linalg.norm(beyond, axis=1) > _FAR_MM)
+        if len(far):
+            turn = self._turns(element[far], local[far], deformed)
+            carried[far] += np.einsum("nij,nj->ni", turn, beyond[far])
+        return carried
+
+    def _turns(self, element: NDArray[np.intp], local: Points, deformed: Points) -> NDArray[np.float64]:
+        """Rotations (N, 3, 3) of the deformation gradients at places within elements."""
+        gradients = shape_gradients(np.clip(local, -1.0, 1.0))
+        before, after = (
+            np.einsum("nac,nad->ncd", nodes[self.hexes[element]], gradients) for nodes in (self.points, deformed)
+        )
+        left, _, right = np.linalg.svd(after @ np.linalg.inv(before))
+        return np.asarray(left @ right)
 
 
 @dataclass(frozen=True)
@@ -81,7 +104,7 @@ class MeshDeformation:
 
     def forward(self, points_breast: Points) -> Points:
         """See `Deformation.forward`; points outside the mesh follow its nearest element."""
-        return self.reference.carry(points_breast, self.deformed)
+        return self.reference.carry(np.asarray(points_breast, dtype=float), self.deformed)
 
     def inverse(self, points_plate: Points) -> Points:
         """See `Deformation.inverse`."""

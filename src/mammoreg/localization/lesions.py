@@ -1,6 +1,5 @@
 """Lesions as both modalities mark them: a body in the MR volume, an area on the detector."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -198,8 +197,3 @@ def area_from_disc(column: float, row: float, diameter_px: float) -> LesionArea:
     distance = np.hypot(columns[None, :] - column, rows[:, None] - row)
     mask = (distance <= 0.5 * diameter_px) | (distance <= distance.min())
     return LesionArea(mask, (int(first[0]), int(first[1])))
-
-
-def marked(areas: Mapping[str, Mapping[str, LesionArea]]) -> list[str]:
-    """Names of the lesions that at least one view marks (view -> name -> area), in order of first appearance."""
-    return list(dict.fromkeys(name for view in areas.values() for name in view))

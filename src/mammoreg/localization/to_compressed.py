@@ -27,34 +27,31 @@ def signed_distance(mask: Volume) -> Volume:
     return mask.with_data(np.where(body, half - inside, outside - half))
 
 
-def fit_surface_to_mask(surface: Points, mask: Volume, *, rotate: bool) -> AffineDeformation:
-    """The rigid motion that lays a surface best on a mask's outline.
+def fit_surface_to_outline(surface: Points, outline: Volume, *, rotate: bool) -> AffineDeformation:
+    """The rigid motion that lays a surface best on a body's outline.
 
     The distances between the surface's points and the outline are minimised with a soft L1 loss (scale 2 mm), because
     a deformed breast does not fit everywhere.
 
     Args:
-        surface: points (N, 3) on the skin, mm, in the mask's frame and near their place.
-        mask: non-zero inside the body; the chest may be part of it.
+        surface: points (N, 3) on the skin, mm, in the outline's frame and near their place.
+        outline: `signed_distance` of the body, of which the chest may be part.
         rotate: let the surface turn about its centroid too, not only shift.
     """
-    distance = signed_distance(mask)
     middle = surface.mean(axis=0)
-    last = np.array(mask.shape) - 1
+    last = np.array(outline.shape) - 1
 
     def motion(parameters: NDArray[np.float64]) -> AffineDeformation:
         turn = Rotation.from_rotvec(parameters[3:]).as_matrix() if rotate else np.eye(3)
         return AffineDeformation(turn, middle + parameters[:3] - turn @ middle)
 
     def misfit(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
-        index = distance.to_index(motion(parameters).forward(surface))
+        index = outline.to_index(motion(parameters).forward(surface))
         held = np.clip(index, 0, last)
-        beyond = np.linalg.norm((index - held) * distance.spacing, axis=1)
-        return np.asarray(distance.sample(distance.to_world(held)) + beyond, dtype=float)
+        beyond = np.linalg.norm((index - held) * outline.spacing, axis=1)
+        return np.asarray(outline.sample(outline.to_world(held)) + beyond, dtype=float)
 
     start = np.zeros(6 if rotate else 3)
     scale = np.array([1.0] * 3 + [0.02] * (len(start) - 3))
-    found = optimize.least_squares(
-        misfit, start, loss="soft_l1", f_scale=_ROBUST_MM, x_scale=scale, diff_step=np.full(len(start), 1e-3)
-    )
+    found = optimize.least_squares(misfit, start, loss="soft_l1", f_scale=_ROBUST_MM, x_scale=scale, xtol=1e-6)
     return motion(found.x)

@@ -8,7 +8,7 @@ import numpy as np
 from mammoreg.geometry import Volume, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.deformation import MethodView
-from mammoreg.localization.to_compressed import fit_surface_to_mask
+from mammoreg.localization.to_compressed import fit_surface_to_outline, signed_distance
 from stages.artefact import Fields
 from stages.localizing.views import CaseViews
 from stages.methods import METHODS
@@ -31,25 +31,28 @@ def predict_in_compressed(
     view = next((v for v in ("3D", "CC", "MLO") if v in views.methods), None)
     rows: list[dict[str, Any]] = []
     points = np.array(list(landmarks.values())).reshape(-1, 3)
-    for method in METHODS if view and len(points) else ():
+    if view is None or not landmarks:
+        return Fields(values={"compressed_rows": rows})
+    outline = signed_distance(compressed)
+    for method in METHODS:
         if method == "rigid":
-            carried = fit_surface_to_mask(skin, compressed, rotate=True).forward(points)
-        elif method in views.methods[str(view)]:
-            carried = _carried(views.methods[str(view)][method], view == "3D", compressed, skin, points)
+            carried = fit_surface_to_outline(skin, outline, rotate=True).forward(points)
+        elif method in views.methods[view]:
+            carried = _carried(views.methods[view][method], view == "3D", outline, skin, points)
         else:
             carried = np.full(points.shape, np.nan)
         rows += _rows(method, list(landmarks), lps_to_breast(carried, laterality))
     return Fields(values={"compressed_rows": rows})
 
 
-def _carried(way: MethodView, placed: bool, compressed: Volume, skin: Points, points: Points) -> Points:
+def _carried(way: MethodView, placed: bool, outline: Volume, skin: Points, points: Points) -> Points:
     """Points (N, 3) between the plates, breast frame, shifted to the outline unless they are placed already."""
     angle = way.geometry.angle_deg
     carried = plate_to_breast(way.deformation.forward(points), angle)
     if placed:
         return carried
     surface = plate_to_breast(way.deformation.forward(skin), angle)
-    return fit_surface_to_mask(surface, compressed, rotate=False).forward(carried)
+    return fit_surface_to_outline(surface, outline, rotate=False).forward(carried)
 
 
 def _rows(method: str, names: list[str], points: Points) -> list[dict[str, Any]]:

@@ -10,7 +10,7 @@ from mammoreg.geometry import Volume, lps_to_breast
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.anatomy import clock_position, distance_to
 from mammoreg.localization.grid import BreastGrid, BreastInView
-from mammoreg.localization.lesions import LesionArea, marked
+from mammoreg.localization.lesions import LesionArea
 from mammoreg.localization.to_mr import MrPrediction, locate_in_breast
 from stages.artefact import Array, Fields, VolumeField
 from stages.localizing.views import CaseViews
@@ -36,25 +36,28 @@ class Anatomy:
     chest_wall: Points
 
 
-def predict_in_mr(views: CaseViews, anatomy: Anatomy, areas: Mapping[str, Mapping[str, LesionArea]]) -> Fields:
+def predict_in_mr(
+    views: CaseViews, anatomy: Anatomy, names_of: Mapping[str, list[str]], areas: Mapping[str, Mapping[str, LesionArea]]
+) -> Fields:
     """Rows `mr_rows` (LPS), and per lesion and method the region and the curves.
 
     Args:
         views: of the case.
         anatomy: of the undeformed breast.
-        areas: lesions by view and name, canonical pixels.
+        names_of: lesions that each view marks, views whose pose failed too.
+        areas: lesions by view and name, canonical pixels, of the other views.
     """
     rows: list[dict[str, Any]] = []
     arrays: dict[str, Array] = {}
     volumes: dict[str, VolumeField] = {}
     grid = BreastGrid(anatomy.breast)
-    names = marked(areas)
+    names = list(dict.fromkeys(name for marked in names_of.values() for name in marked))
     for method in METHODS if names else ():
         offered = {view: m[method] for view, m in views.methods.items() if view in areas and method in m}
         seen = {view: BreastInView(way, grid) for view, way in offered.items()}
         for number, name in enumerate(names):
-            shown = {view: areas[view][name] for view in areas if name in areas[view]}
-            usable = {view: area for view, area in shown.items() if view in seen}
+            shown = [view for view in names_of if name in names_of[view]]
+            usable = {view: areas[view][name] for view in shown if view in seen}
             lost = [views.troubles.get((view, method), "") for view in shown if view not in seen]
             if not usable:
                 rows.append(_line(method, name, "+".join(shown), "; ".join(lost)))

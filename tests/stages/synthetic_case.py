@@ -1,0 +1,148 @@
+"""A synthetic breast whose compression is affine, as the artefacts of the stages before `localize` hold it."""
+
+import itertools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mammoreg.geometry import ViewGeometry, Volume, lps_to_breast
+from mammoreg.geometry.frames import Laterality, plate_rotation
+from mammoreg.localization.deformation import AffineDeformation
+from mammoreg.meshing.block import BlockMesh
+from stages.artefact import Array, Fields, VolumeField, write_artefact
+
+SHRINK = 0.7
+ROWS, COLUMNS, PIXEL_MM = 700, 400, 0.25
+HALF_WIDTH, DEPTH = 45.0, 70.0
+
+
+def box() -> BlockMesh:
+    """A box-shaped breast, breast frame."""
+    n = 5
+    axis = np.linspace(0, 1, n + 1)
+    k, j, i = np.meshgrid(axis, axis, axis, indexing="ij")
+    points = [(2 * i - 1) * HALF_WIDTH, -k * DEPTH, (2 * j - 1) * HALF_WIDTH]
+    return BlockMesh(n, np.stack(points, axis=-1).reshape(-1, 3))
+
+
+def geometry(view: str, parallel: bool = False) -> ViewGeometry:
+    angle = {"CC": 3.0, "MLO": 48.0, "3D": 3.0}[view]
+    return ViewGeometry(angle, 5.0, 2.0, -40.0, 80.0, 650.0, 15.0, PIXEL_MM, ROWS, COLUMNS, parallel)
+
+
+def compression(view: str) -> AffineDeformation:
+    wide = SHRINK**-0.5
+    return AffineDeformation(np.diag([wide, wide, SHRINK]) @ plate_rotation(geometry(view).angle_deg), np.zeros(3))
+
+
+def turning(view: str) -> AffineDeformation:
+    return AffineDeformation(plate_rotation(geometry(view).angle_deg), np.zeros(3))
+
+
+def header(stage: str, laterality: Laterality, view: str = "") -> dict[str, str]:
+    return {"stage": stage, "case": "case1", "view": view, "laterality": laterality, "artefact_id": f"{stage}{view}"}
+
+
+def write_segment(path: Path, laterality: Laterality, compressed: bool = False) -> Path:
+    spacing, n = np.full(3, 2.0), (56, 44, 56)
+    origin = np.array([-55.0, -75.0, -55.0])
+    grid = np.stack(
+        np.meshgrid(*(o + s * np.arange(k) for o, s, k in zip(origin, spacing, n, strict=True)), indexing="ij"), axis=-1
+    )
+    inside = (np.abs(grid[..., [0, 2]]) < HALF_WIDTH).all(-1) & (grid[..., 1] < 0) & (grid[..., 1] > -DEPTH)
+    mask = Volume(inside.astype(np.uint8), origin, spacing).between_lps_and_breast(laterality)
+    side = np.linspace(-HALF_WIDTH, HALF_WIDTH, 31)
+    wall = np.stack([*np.meshgrid(side, side, indexing="ij"), np.zeros((31, 31))], axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
+    volumes = {"breast_mask": VolumeField(mask, "1", "breast")}
+    if compressed:
+        volumes["compressed_mask"] = VolumeField(_compressed_mask(laterality), "1", "body between the plates")
+    arrays = {
+        "nipple": Array(lps_to_breast(np.array([0.0, -DEPTH, 0.0]), laterality), "mm", "nipple"),
+        "chest_wall_surface": Array(lps_to_breast(wall, laterality), "mm", "chest wall"),
+    }
+    write_artefact(path, header("segment", laterality), Fields(arrays=arrays, volumes=volumes))
+    return path
+
+
+SECOND_VOLUME_SHIFT = np.array([4.0, -3.0, 6.0])
+
+
+def _compressed_mask(laterality: Laterality) -> Volume:
+    """The body between the plates of the CC, shifted by `SECOND_VOLUME_SHIFT`, with a chest behind."""
+    axis = np.arange(-90.0, 91.0, 2.0)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3) - SECOND_VOLUME_SHIFT
+    back = compression("CC").inverse(grid @ plate_rotation(geometry("CC").angle_deg).T)
+    body = (np.abs(back[:, [0, 2]]) < HALF_WIDTH).all(-1) & (back[:, 1] > -DEPTH) | (back[:, 1] > 0)
+    data = body.reshape(len(axis), len(axis), len(axis)).astype(np.uint8)
+    return Volume(data, np.full(3, -90.0), np.full(3, 2.0)).between_lps_and_breast(laterality)
+
+
+def write_mesh(path: Path, laterality: Laterality) -> Path:
+    block = box()
+    arrays = {"points": Array(lps_to_breast(block.points, laterality), "mm", "nodes")}
+    write_artefact(path, header("mesh", laterality), Fields(arrays=arrays, values={"n": block.n}))
+    return path
+
+
+def write_pose(path: Path, laterality: Laterality, view: str, flip_rows: bool, flip_columns: bool) -> Path:
+    g = geometry(view)
+    placed = {name: getattr(g, name) for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")}
+    values: dict[str, Any] = {**placed, **{f"rigid_{name}": value for name, value in placed.items()}}
+    values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": []}
+    values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}
+    values |= {"flip_rows": flip_rows, "flip_columns": flip_columns}
+    corners = np.array([[0, -1], [-1, -1], [-1, 1], [0, 1]]) * np.array([DEPTH, HALF_WIDTH])
+    edges = [np.linspace(a, b, 60) for a, b in itertools.pairwise(corners)]
+    skin = np.concatenate(edges)
+    outline = g.project(np.stack([skin[:, 1] * SHRINK**-0.5, skin[:, 0] * SHRINK**-0.5, 0 * skin[:, 0]], axis=1))
+    arrays = {
+        "outline": Array(outline, "px", "outline"),
+        "outline_weight": Array(np.ones(len(outline)), "1", "trust in the outline"),
+    }
+    for name, affine in {"rigid": turning(view), "scaling": compression(view)}.items():
+        arrays[f"{name}_matrix"] = Array(affine.matrix, "1", name)
+        arrays[f"{name}_offset"] = Array(affine.offset, "mm", name)
+    write_artefact(path, header("pose", laterality, view), Fields(arrays=arrays, values=values))
+    return path
+
+
+def write_solution(path: Path, laterality: Laterality, stage: str, view: str) -> Path:
+    arrays = {"deformed": Array(compression(view).forward(box().points), "mm", "nodes between the plates")}
+    values = {"force_n": 80.0, "min_det_f": 0.9}
+    write_artefact(path, header(stage, laterality, view), Fields(arrays=arrays, values=values))
+    return path
+
+
+def write_failed(path: Path, laterality: Laterality, stage: str, view: str = "", message: str = "went wrong") -> Path:
+    write_artefact(path, header(stage, laterality, view), Fields(status="failed", message=f"{stage}: {message}"))
+    return path
+
+
+def write_case(
+    folder: Path,
+    laterality: Laterality = "R",
+    views: tuple[str, ...] = ("CC", "MLO"),
+    flips: tuple[bool, bool] = (False, False),
+    compressed: bool = False,
+) -> dict[str, list[Path]]:
+    """All artefacts before `localize`, as inputs by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    inputs = {
+        "segment": [write_segment(folder / "segment.h5", laterality, compressed)],
+        "mesh": [write_mesh(folder / "mesh.h5", laterality)],
+        "pose": [write_pose(folder / f"pose.{v}.h5", laterality, v, *flips) for v in views],
+    }
+    for stage in ("compress", "solve"):
+        inputs[stage] = [write_solution(folder / f"{stage}.{v}.h5", laterality, stage, v) for v in views]
+    return inputs
+
+
+def true_pixel(view: str, point: np.ndarray) -> np.ndarray:
+    """Canonical pixel (column, row) of a point of the undeformed breast, breast frame."""
+    return geometry(view).project(compression(view).forward(point[None]))[0]
+
+
+def stored(pixel: np.ndarray, flips: tuple[bool, bool]) -> np.ndarray:
+    column, row = pixel
+    return np.array([COLUMNS - 1 - column if flips[1] else column, ROWS - 1 - row if flips[0] else row])

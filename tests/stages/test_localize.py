@@ -1,0 +1,200 @@
+"""Stage `localize` on a breast whose compression is known in closed form."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mammoreg.geometry import lps_to_breast, plate_to_breast
+from mammoreg.geometry.frames import Laterality
+from stages.artefact import Artefact
+from stages.contract import Subject
+from stages.run import run_stage
+from tests.stages import synthetic_case as synthetic
+
+LESION = np.array([12.0, -40.0, 9.0])
+POINTS = {"p1": np.array([-20.0, -30.0, 15.0]), "p2": np.array([5.0, -60.0, -25.0]), "deep": np.array([0.0, 60.0, 0.0])}
+
+
+def write_tsv(path: Path, columns: str, rows: dict[str, Any]) -> Path:
+    lines = ["\t".join(columns.split())]
+    lines += ["\t".join([name, *(f"{x:.6f}" for x in np.ravel(numbers))]) for name, numbers in rows.items()]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def mr_marks(folder: Path, laterality: Laterality) -> dict[str, Path]:
+    lesion = {"mass": [*lps_to_breast(LESION, laterality), 10.0]}
+    points = {name: lps_to_breast(point, laterality) for name, point in POINTS.items()}
+    return {
+        "mr_lesion": write_tsv(folder / "lesion.tsv", "name x y z diameter_mm", lesion),
+        "mr_landmarks": write_tsv(folder / "landmarks.tsv", "name x y z", points),
+    }
+
+
+def view_marks(folder: Path, views: tuple[str, ...], flips: tuple[bool, bool]) -> dict[str, Path]:
+    return {
+        f"lesion_{view}": write_tsv(
+            folder / f"lesion_{view}.tsv",
+            "name column row diameter_mm",
+            {"mass": [*synthetic.stored(synthetic.true_pixel(view, LESION), flips), 10.0]},
+        )
+        for view in views
+    }
+
+
+def localized(inputs: dict[str, Any], output: Path, laterality: Laterality = "R") -> Artefact:
+    run_stage("localize", inputs, output, {}, Subject("case1", laterality))
+    return Artefact(output)
+
+
+def rows_of(artefact: Artefact, name: str, method: str = "updated") -> list[dict[str, Any]]:
+    return [row for row in artefact.value(name) if row["method"] == method]
+
+
+@pytest.fixture(scope="module")
+def both_ways(tmp_path_factory: pytest.TempPathFactory) -> Artefact:
+    folder = tmp_path_factory.mktemp("both")
+    inputs = synthetic.write_case(folder, compressed=True)
+    marks = mr_marks(folder, "R") | view_marks(folder, ("CC", "MLO"), (False, False))
+    return localized(inputs | marks, folder / "localize.h5")
+
+
+@pytest.mark.parametrize("method", ["scaling", "plate", "updated"])
+def test_mammogram_shows_what_the_mr_marks(both_ways: Artefact, method: str) -> None:
+    rows = {(r["view"], r["name"]): r for r in rows_of(both_ways, "mammogram_rows", method)}
+    for view in ("CC", "MLO"):
+        for name, point in {"mass": LESION, "p1": POINTS["p1"], "p2": POINTS["p2"]}.items():
+            row = rows[view, name]
+            assert row["seen"]
+            np.testing.assert_allclose([row["column"], row["row"]], synthetic.true_pixel(view, point), atol=0.6)
+        assert rows[view, "deep"] == {
+            "view": view, "method": method, "name": "deep", "column": None, "row": None, "radius_mm": None,
+            "seen": False, "message": "outside the imaged part",
+        }  # fmt: skip
+
+
+@pytest.mark.parametrize("method", ["scaling", "plate", "updated"])
+def test_mr_shows_what_both_mammograms_mark(both_ways: Artefact, method: str) -> None:
+    (row,) = rows_of(both_ways, "mr_rows", method)
+    assert (row["views"], row["name"], row["message"]) == ("CC+MLO", "mass", "")
+    np.testing.assert_allclose([row["x"], row["y"], row["z"]], LESION, atol=0.6)
+    assert row["beam_gap_mm"] < 0.3
+    assert row["nipple_distance_mm"] == pytest.approx(np.linalg.norm(LESION - [0, -synthetic.DEPTH, 0]), abs=0.6)
+    assert row["clock"] == "2:00"
+    assert row["skin_depth_mm"] == pytest.approx(30.0, abs=0.8)
+    assert row["chest_wall_depth_mm"] == pytest.approx(40.0, abs=0.8)
+    region = both_ways.volume(f"mr/{method}/lesion0/region")
+    np.testing.assert_allclose(region.centres(region.data != 0).mean(axis=0), LESION, atol=0.6)
+
+
+def test_the_second_volume_is_placed_by_its_outline(both_ways: Artefact) -> None:
+    rows = {row["name"]: row for row in rows_of(both_ways, "compressed_rows")}
+    for name, point in POINTS.items():
+        if name == "deep":
+            continue
+        angle = synthetic.geometry("CC").angle_deg
+        carried = plate_to_breast(synthetic.compression("CC").forward(point[None])[0], angle)
+        found = [rows[name][axis] for axis in "xyz"]
+        np.testing.assert_allclose(found, carried + synthetic.SECOND_VOLUME_SHIFT, atol=0.6)
+    assert len(rows_of(both_ways, "compressed_rows", "rigid")) == len(POINTS)
+
+
+def test_without_mammogram_the_plates_place_the_result(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("3D",), compressed=True) | mr_marks(tmp_path, "R")
+    found = localized(inputs, tmp_path / "localize.h5")
+    assert found.value("mammogram_rows") == []
+    row = next(row for row in rows_of(found, "compressed_rows", "plate") if row["name"] == "p1")
+    carried = plate_to_breast(synthetic.compression("3D").forward(POINTS["p1"][None])[0], 3.0)
+    np.testing.assert_allclose([row[axis] for axis in "xyz"], carried, atol=1e-3)
+
+
+@pytest.mark.parametrize("flips", [(False, True), (True, False), (True, True)])
+def test_mirrored_patient_and_flipped_images_give_mirrored_predictions(
+    both_ways: Artefact, tmp_path: Path, flips: tuple[bool, bool]
+) -> None:
+    inputs = synthetic.write_case(tmp_path, "L", flips=flips, compressed=True)
+    marks = mr_marks(tmp_path, "L") | view_marks(tmp_path, ("CC", "MLO"), flips)
+    mirrored = localized(inputs | marks, tmp_path / "localize.h5", "L")
+    for right, left in zip(both_ways.value("mammogram_rows"), mirrored.value("mammogram_rows"), strict=True):
+        assert right["seen"] == left["seen"]
+        if right["seen"]:
+            expected = synthetic.stored(np.array([right["column"], right["row"]]), flips)
+            np.testing.assert_allclose([left["column"], left["row"]], expected, atol=1e-6)
+    for name in ("mr_rows", "compressed_rows"):
+        for right, left in zip(both_ways.value(name), mirrored.value(name), strict=True):
+            np.testing.assert_allclose([-left["x"], left["y"], left["z"]], [right[a] for a in "xyz"], atol=1e-4)
+    assert mirrored.value("mr_rows")[0]["clock"] == "10:00"
+
+
+def test_directions_do_not_read_each_others_marks(both_ways: Artefact, tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, compressed=True)
+    only_mr = localized(inputs | mr_marks(tmp_path, "R"), tmp_path / "mr.h5")
+    only_views = localized(inputs | view_marks(tmp_path, ("CC", "MLO"), (False, False)), tmp_path / "views.h5")
+    assert only_mr.value("mammogram_rows") == both_ways.value("mammogram_rows")
+    assert only_mr.value("compressed_rows") == both_ways.value("compressed_rows")
+    assert only_mr.value("mr_rows") == []
+    assert only_views.value("mr_rows") == both_ways.value("mr_rows")
+    assert only_views.value("mammogram_rows") == only_views.value("compressed_rows") == []
+
+
+def test_one_view_gives_curve_and_midpoint(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",)) | view_marks(tmp_path, ("CC",), (False, False))
+    found = localized(inputs, tmp_path / "localize.h5")
+    (row,) = rows_of(found, "mr_rows")
+    assert (row["views"], row["beam_gap_mm"]) == ("CC", None)
+    curve = found.array("mr/updated/lesion0/curve_CC", "mm")
+    assert np.linalg.norm(curve - LESION, axis=1).min() < 0.6
+    assert row["z"] == pytest.approx(0.0, abs=3.0)
+
+
+def test_a_view_that_failed_leaves_the_other_standing(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    for stage in ("pose", "compress", "solve"):
+        inputs[stage][1] = synthetic.write_failed(tmp_path / f"{stage}_failed.h5", "R", stage, "MLO", "no breast found")
+    marks = mr_marks(tmp_path, "R") | view_marks(tmp_path, ("CC", "MLO"), (False, False))
+    found = localized(inputs | marks, tmp_path / "localize.h5")
+    assert found.status == "failed"
+    assert "no breast found" in found.message
+    rows = rows_of(found, "mammogram_rows")
+    assert {row["view"]: row["seen"] for row in rows if row["name"] == "mass"} == {"CC": True, "MLO": False}
+    assert "no breast found" in next(row["message"] for row in rows if row["view"] == "MLO")
+    (row,) = rows_of(found, "mr_rows")
+    assert row["views"] == "CC"
+    assert "no breast found" in row["message"]
+
+
+def test_a_compression_without_result_leaves_rigid_and_scaling(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    for stage in ("compress", "solve"):
+        inputs[stage] = [synthetic.write_failed(tmp_path / f"{stage}_failed.h5", "R", stage, "CC", "diverged")]
+    found = localized(inputs | mr_marks(tmp_path, "R"), tmp_path / "localize.h5")
+    seen = {row["method"]: row["seen"] for row in found.value("mammogram_rows") if row["name"] == "mass"}
+    assert seen == {"rigid": True, "scaling": True, "plate": False, "updated": False}
+
+
+def test_a_failed_mesh_is_passed_on(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    inputs["mesh"] = [synthetic.write_failed(tmp_path / "failed.h5", "R", "mesh", message="turned inside out")]
+    found = localized(inputs | mr_marks(tmp_path, "R"), tmp_path / "localize.h5")
+    assert (found.status, found.message) == ("failed", "mesh: turned inside out")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("name\tx\ty\n", "empty"),
+        ("name\tx\ty\tdiameter_mm\na\t1\t2\t3\n", "no column z"),
+        ("name\tx\ty\tz\tdiameter_mm\na\t1\t2\tthree\t4\n", "'three' is no number"),
+        ("name\tx\ty\tz\tdiameter_mm\na\t1\t2\t3\t0\n", "must be positive"),
+        ("name\tx\ty\tz\tdiameter_mm\na\t1\t2\t3\t4\na\t1\t2\t3\t4\n", "given twice"),
+    ],
+)
+def test_bad_lesion_tables_end_the_case_with_a_message(tmp_path: Path, text: str, says: str) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    (tmp_path / "bad.tsv").write_text(text)
+    found = localized(inputs | {"mr_lesion": tmp_path / "bad.tsv"}, tmp_path / "localize.h5")
+    assert found.status == "failed"
+    assert says in found.message
+    assert str(tmp_path) not in found.message
