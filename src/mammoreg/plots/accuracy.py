@@ -1,0 +1,90 @@
+"""Errors over a cohort, and error against computing time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from mammoreg.plots.style import NOTICE, Png, method_colour, new_figure, to_png
+
+LIMIT_MM = 5.0
+_MARKERS = {"CC": "o", "MLO": "s", "3D": "^"}
+
+
+@dataclass(frozen=True)
+class ErrorPanel:
+    """Distances in mm by method, and the paper's means of the methods that it has."""
+
+    title: str
+    distances: Mapping[str, Sequence[float]]
+    paper_mean: Mapping[str, float]
+
+
+def error_panels(panels: Sequence[ErrorPanel]) -> Png:
+    """One panel a quantity: a dot for each distance, a bar for the mean, a diamond for the paper's mean."""
+    with new_figure(3.6 * len(panels), 3.4) as figure:
+        for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
+            _draw_errors(axes, panel)
+        figure.suptitle(NOTICE, fontsize=8, color="#444444", x=0.01, ha="left")
+        return to_png(figure)
+
+
+def _draw_errors(axes: Axes, panel: ErrorPanel) -> None:
+    for place, (method, values) in enumerate(panel.distances.items()):
+        found = np.sort(np.asarray(values, dtype=float))
+        spread = place + 0.32 * (np.arange(len(found)) % 7 - 3) / 3
+        axes.plot(spread, found, "o", color=method_colour(method), ms=3.8, alpha=0.6, mew=0)
+        if len(found):
+            axes.hlines(found.mean(), place - 0.36, place + 0.36, color="#111111", lw=1.8)
+        if method in panel.paper_mean:
+            axes.plot(place, panel.paper_mean[method], "D", mfc="none", mec="#c2185b", ms=6, mew=1.3)
+    axes.axhline(LIMIT_MM, color="#999999", lw=0.9, ls="--")
+    axes.set_xticks(range(len(panel.distances)), list(panel.distances))
+    axes.set_xlim(-0.6, max(len(panel.distances), 1) - 0.4)
+    axes.set_ylim(0.0, None)
+    axes.set_ylabel("distance (mm)")
+    axes.set_title(panel.title)
+
+
+@dataclass(frozen=True)
+class RuntimePoint:
+    """One run: its method, view, elements a side, median error in mm and time in s."""
+
+    method: str
+    view: str
+    elements: int
+    error_mm: float
+    total_s: float
+
+
+def error_against_runtime(points: Sequence[RuntimePoint]) -> Png:
+    """Error against total time on logarithmic axes; a line joins the meshes of one method and view."""
+    with new_figure(6.4, 4.4) as figure:
+        axes = figure.subplots()
+        series: dict[tuple[str, str], list[RuntimePoint]] = {}
+        for point in sorted(points, key=lambda p: p.elements):
+            series.setdefault((point.method, point.view), []).append(point)
+        for (method, view), runs in series.items():
+            time, error = [run.total_s for run in runs], [run.error_mm for run in runs]
+            axes.plot(
+                time,
+                error,
+                f"-{_MARKERS.get(view, 'o')}",
+                color=method_colour(method),
+                lw=1.2,
+                ms=5,
+                label=f"{method} {view}",
+            )
+            for run in runs:
+                place = (run.total_s, run.error_mm)
+                axes.annotate(str(run.elements), place, textcoords="offset points", xytext=(4, 3), fontsize=7)
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.grid(True, which="both", color="#e6e6e6", lw=0.6)
+        axes.set_xlabel("time from mesh to prediction, processor seconds (s)")
+        axes.set_ylabel("mean distance to the truth (mm)")
+        axes.legend(ncols=2)
+        axes.set_title("Error against computing time; numbers: elements a side", loc="left")
+        figure.suptitle(NOTICE, fontsize=8, color="#444444", x=0.01, ha="left")
+        return to_png(figure)

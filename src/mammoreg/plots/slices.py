@@ -1,0 +1,76 @@
+"""Slices of an MR volume with the borders of masks, in radiological orientation."""
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mammoreg.geometry import Volume
+from mammoreg.plots.style import add_corner_label, add_scale_bar, grey_window
+
+Plane = Literal["axial", "sagittal", "coronal"]
+
+# normal, horizontal and vertical axis; letters at left, right, bottom, top. Anterior is up in axial slices and
+# left in sagittal ones; the patient's right is the picture's left.
+_PLANES: dict[Plane, tuple[int, int, int, str]] = {
+    "axial": (2, 0, 1, "RLPA"),
+    "sagittal": (0, 1, 2, "APIS"),
+    "coronal": (1, 0, 2, "RLIS"),
+}
+
+
+@dataclass(frozen=True)
+class SliceOverlay:
+    """Border of a mask volume on any grid in the frame of the slice, in a colour."""
+
+    mask: Volume
+    colour: str
+    style: str = "-"
+
+
+def show_slice(
+    axes: Axes, volume: Volume, plane: Plane, through: NDArray[Any], overlays: list[SliceOverlay], title: str
+) -> None:
+    """Show the slice of an LPS volume through a point (3,) in mm, with the borders of masks."""
+    normal, horizontal, vertical, letters = _PLANES[plane]
+    pixels = _slice_pixels(volume, plane, through)
+    low, high = grey_window(pixels, pixels > 0.05 * np.nanmax(pixels, initial=0.0))
+    x, y = (volume.origin[a] + volume.spacing[a] * np.arange(volume.shape[a]) for a in (horizontal, vertical))
+    half_x, half_y = 0.5 * volume.spacing[horizontal], 0.5 * volume.spacing[vertical]
+    extent = (x[0] - half_x, x[-1] + half_x, y[0] - half_y, y[-1] + half_y)
+    axes.imshow(pixels, cmap="gray", vmin=low, vmax=high, extent=extent, origin="lower", aspect="equal")
+    if plane == "axial":
+        axes.invert_yaxis()
+    for overlay in overlays:
+        _draw_border(axes, overlay, plane, through)
+    axes.set_title(f"{title}, {'xyz'[normal]} = {through[normal]:.0f} mm")
+    axes.set_xlabel(f"{'xyz'[horizontal]} LPS (mm)")
+    axes.set_ylabel(f"{'xyz'[vertical]} LPS (mm)")
+    for letter, edge in zip(letters, ("left", "right", "bottom", "top"), strict=True):
+        add_corner_label(axes, letter, edge)
+    add_scale_bar(axes)
+
+
+def _slice_pixels(volume: Volume, plane: Plane, through: NDArray[Any]) -> NDArray[np.float64]:
+    """Nearest slice of a volume as pixels (vertical, horizontal); zeros where the point lies beyond the grid."""
+    normal, horizontal, vertical, _ = _PLANES[plane]
+    index = round(float((through[normal] - volume.origin[normal]) / volume.spacing[normal]))
+    if not 0 <= index < volume.shape[normal]:
+        return np.zeros((volume.shape[vertical], volume.shape[horizontal]))
+    taken = np.take(volume.data, index, axis=normal).astype(float)
+    return np.asarray(taken.T)
+
+
+def _draw_border(axes: Axes, overlay: SliceOverlay, plane: Plane, through: NDArray[Any]) -> None:
+    """Border of the mask in the slice; nothing where the slice misses it."""
+    mask = overlay.mask
+    pixels = _slice_pixels(mask, plane, through)
+    if not (pixels > 0.5).any():
+        return
+    _, horizontal, vertical, _ = _PLANES[plane]
+    x, y = (mask.origin[a] + mask.spacing[a] * np.arange(-1, mask.shape[a] + 1) for a in (horizontal, vertical))
+    axes.contour(
+        x, y, np.pad(pixels, 1), levels=[0.5], colors=[overlay.colour], linewidths=1.4, linestyles=overlay.style
+    )
