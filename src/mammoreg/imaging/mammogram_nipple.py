@@ -6,7 +6,7 @@ from scipy import ndimage
 
 _SMOOTH_MM = 2.0
 _BASE_MM = 6.0
-_LEAST_PROTRUSION_MM = 0.5
+_LEAST_PROTRUSION_MM = 0.6
 _FRONT_SHARE = 0.75
 
 
@@ -16,7 +16,7 @@ def nipple_in_outline(
     """Position (2,) of the nipple as (column, row) on an outline (M, 2), or None where none stands out.
 
     The outline is compared with itself smoothed over the width of an areola: the nipple is the largest protrusion in
-    the front of the breast, if it exceeds the outline's usual one by 0.5 mm; a flatter one is as often a fold.
+    the front of the breast, if it exceeds the outline's usual one by 0.6 mm; a flatter one is as often a fold.
     """
     step = float(np.mean(np.linalg.norm(np.diff(outline, axis=0), axis=1))) * pixel_mm
     fine = ndimage.gaussian_filter1d(outline, _SMOOTH_MM / step, axis=0, mode="nearest")

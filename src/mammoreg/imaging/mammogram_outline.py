@@ -12,6 +12,8 @@ _STEP_MM = 1.0
 _SAMPLING_MM = 0.25
 _WINDOW_MM = 5.0
 _MARGIN_MM = 1.0
+_INSIDE_MM = 0.75
+_REFINED_MM = 0.05
 FADE_MM = 10.0
 
 
@@ -25,6 +27,7 @@ def outline_polyline(
     """
     contour = _longest_contour(_only_breast(smooth, mask, air, pixel_mm), level)
     contour = _open_at_chest_wall(contour, _MARGIN_MM / pixel_mm)
+    contour = _at_half_height(_resampled(contour, _SAMPLING_MM / pixel_mm), smooth, mask, air, pixel_mm)
     contour = _smooth_polyline(contour, pixel_mm)
     return contour if contour[0, 1] <= contour[-1, 1] else contour[::-1].copy()
 
@@ -74,8 +77,32 @@ def _open_at_chest_wall(contour: NDArray[np.float64], margin: float) -> NDArray[
     return np.asarray(ring[ring[:, 0] > ring[:, 0].min() + margin], dtype=float)
 
 
-def _smooth_polyline(contour: NDArray[np.float64], pixel_mm: float) -> NDArray[np.float64]:
-    dense = _resampled(contour, _SAMPLING_MM / pixel_mm)
+def _at_half_height(
+    contour: NDArray[np.float64], smooth: Pixels, mask: NDArray[np.bool_], air: Air, pixel_mm: float
+) -> NDArray[np.float64]:
+    """Move each point along its normal to half of the brightness that is reached just inside.
+
+    The contour's level lies near the air's, which blur carries outwards by its own width.
+    """
+    tangent = np.gradient(signal.savgol_filter(contour, min(21, len(contour) // 2 * 2 - 1), 1, axis=0), axis=0)
+    outward = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
+    steps = np.arange(-_INSIDE_MM, _INSIDE_MM, _REFINED_MM)
+    places = contour[:, None, :] + (steps / pixel_mm)[None, :, None] * outward[:, None, :]
+    if _sample(mask.astype(np.float32), places[:, 0]).mean() < _sample(mask.astype(np.float32), places[:, -1]).mean():
+        places = places[:, ::-1]
+    above = _sample(smooth, places) - air.level
+    low = above < 0.5 * above[:, :1]
+    first = np.where(low.any(axis=1), np.argmax(low, axis=1), len(steps) // 2)
+    return np.asarray(places[np.arange(len(contour)), first], dtype=float)
+
+
+def _sample(image: Pixels, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    values = ndimage.map_coordinates(image, [places[..., 1], places[..., 0]], order=1, mode="nearest")
+    return np.asarray(values, dtype=float)
+
+
+def _smooth_polyline(dense: NDArray[np.float64], pixel_mm: float) -> NDArray[np.float64]:
     window = round(_WINDOW_MM / _SAMPLING_MM) | 1
     if len(dense) <= window:
         raise DataError("the breast's edge against air in the mammogram is shorter than 5 mm; check the image")

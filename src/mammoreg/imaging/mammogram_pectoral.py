@@ -10,8 +10,10 @@ _GRID_MM = 1.0
 _STEP_MM = 3.0
 _NORMAL_DEG = np.arange(8.0, 66.0, 2.0)
 _LEAST_LENGTH_MM = 25.0
-_LEAST_CONTRAST_SHARE = 0.04
-_LEAST_CONSISTENCY = 0.75
+_LEAST_CONTRAST_SHARE = 0.12
+_LEAST_CONSISTENCY = 0.85
+_RIM_MM = 10.0
+_LARGEST_SHARE = 0.45
 _BAND_MM = 8.0
 _BEND_COST = 0.15
 
@@ -31,7 +33,7 @@ def pectoral_mask(pixels: Pixels, mask: NDArray[np.bool_], pixel_mm: float) -> N
     grid_mm = factor * pixel_mm
     coarse = np.asarray(ndimage.gaussian_filter(_block_mean(pixels, factor), 1.0 / grid_mm), dtype=np.float32)
     inside = _block_mean(mask.astype(np.float32), factor) > 0.5
-    line = _best_line(coarse, inside, grid_mm)
+    line = _best_line(coarse, inside, _away_from_skin(inside, grid_mm), grid_mm)
     if line is None:
         return None
     corner = _behind_bent_edge(coarse, inside, line, grid_mm)
@@ -59,26 +61,35 @@ def _sample(image: NDArray[np.float32], points: NDArray[np.float64]) -> NDArray[
     return np.asarray(values, dtype=float)
 
 
-def _best_line(image: Pixels, inside: NDArray[np.bool_], grid_mm: float) -> tuple[NDArray[np.float64], float] | None:
+def _away_from_skin(inside: NDArray[np.bool_], grid_mm: float) -> NDArray[np.bool_]:
+    """Where brightness does not fall off because the breast ends; image borders are no skin."""
+    padded = np.pad(inside, 1, mode="edge")
+    return np.asarray(ndimage.distance_transform_edt(padded)[1:-1, 1:-1] * grid_mm > _RIM_MM, dtype=bool)
+
+
+def _best_line(
+    image: Pixels, inside: NDArray[np.bool_], deep: NDArray[np.bool_], grid_mm: float
+) -> tuple[NDArray[np.float64], float] | None:
     """Normal (2,) and offset of the line with the largest drop of brightness away from the upper posterior corner."""
+    rows, across = np.indices(image.shape)
     reach = float(np.ptp(np.percentile(image[inside], (5, 95))))
-    columns = np.flatnonzero(inside.any(axis=0))
     best: tuple[float, NDArray[np.float64], float] | None = None
     for degrees in _NORMAL_DEG:
         normal = np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))])
-        for offset in np.arange(5.0, 0.75 * normal[0] * columns[-1] + normal[1] * 0.7 * image.shape[0], 1.0):
-            score = _line_score(image, inside, normal, offset, grid_mm, reach)
+        last = np.quantile((across * normal[0] + rows * normal[1])[inside], _LARGEST_SHARE)
+        for offset in np.arange(5.0, last, 1.0):
+            score = _line_score(image, deep, normal, offset, grid_mm, reach)
             if score is not None and (best is None or score > best[0]):
                 best = (score, normal, float(offset))
     return None if best is None else (best[1], best[2])
 
 
 def _line_score(
-    image: Pixels, inside: NDArray[np.bool_], normal: NDArray[np.float64], offset: float, grid_mm: float, reach: float
+    image: Pixels, deep: NDArray[np.bool_], normal: NDArray[np.float64], offset: float, grid_mm: float, reach: float
 ) -> float | None:
     points = _line_points(normal, offset, image.shape)
     step = _STEP_MM / grid_mm * normal
-    points = points[_sample(inside.astype(np.float32), points + step) > 0.5] if len(points) else points
+    points = points[_sample(deep.astype(np.float32), points + step) > 0.5] if len(points) else points
     # The edge must leave the image at its chest wall, or its upper part, as a muscle's does.
     if len(points) * grid_mm < _LEAST_LENGTH_MM or points[:, 0].min() > 5.0 / grid_mm:
         return None

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 from pydicom import dcmread
 from pydicom.dataset import Dataset
 from pydicom.errors import InvalidDicomError
@@ -97,10 +98,9 @@ def _decoded_by_itk(path: Path) -> NDArray[Any]:
 
 
 def _picture_pixels(path: Path) -> NDArray[np.float32]:
-    from skimage.io import imread
-
     try:
-        pixels = np.asarray(imread(path))
+        with Image.open(path) as picture:
+            pixels = np.asarray(picture.convert("RGB") if picture.mode == "P" else picture)
     except (OSError, ValueError, SyntaxError) as error:
         raise DataError(f"{path}: cannot be read as a picture; export the image again as .png or .tif") from error
     return _one_channel(path, pixels)

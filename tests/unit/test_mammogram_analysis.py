@@ -1,0 +1,102 @@
+"""Breast, outline, pectoral muscle and nipple in mammograms."""
+
+import numpy as np
+import pytest
+
+from mammoreg.errors import DataError
+from mammoreg.imaging.mammogram import analyse
+from tests.unit.mammogram_images import (
+    DEPTH_MM,
+    HALF_HEIGHT_MM,
+    MIDDLE_ROW,
+    PIXEL_MM,
+    SHAPE,
+    breast_image,
+    inside_share,
+    with_pectoral,
+)
+
+
+def _distance_to_ellipse_mm(outline):
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 4001)
+    true = np.stack([DEPTH_MM * np.cos(angle), HALF_HEIGHT_MM * np.sin(angle)], axis=1)
+    found = np.stack([(outline[:, 0] + 0.5) * PIXEL_MM, (outline[:, 1] - MIDDLE_ROW) * PIXEL_MM], axis=1)
+    return np.linalg.norm(found[:, None] - true[None], axis=2).min(axis=1)
+
+
+def test_outline_of_an_ellipse_is_found_below_a_pixel():
+    found = analyse(breast_image(), PIXEL_MM, "CC")
+    distance = _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0])
+    assert distance.mean() < 0.15
+    assert distance.max() < 0.4
+
+
+def test_outline_runs_evenly_from_low_to_high_rows_and_fades_at_the_chest_wall():
+    found = analyse(breast_image(), PIXEL_MM, "CC")
+    assert found.outline[0, 1] < MIDDLE_ROW < found.outline[-1, 1]
+    steps = np.linalg.norm(np.diff(found.outline, axis=0), axis=1) * PIXEL_MM
+    assert steps == pytest.approx(1.0, abs=0.15)
+    expected = np.clip(found.outline[:, 0] * PIXEL_MM / 10.0, 0.0, 1.0)
+    assert found.outline_weight == pytest.approx(expected, abs=0.05)
+    assert found.pectoral is None
+
+
+def test_text_in_the_air_is_no_breast():
+    mask = analyse(breast_image(), PIXEL_MM, "CC").mask
+    true = inside_share() < 1.0
+    assert not mask[20:40, 340:390].any()
+    assert 2.0 * (mask & true).sum() / (mask.sum() + true.sum()) > 0.995
+
+
+def test_result_does_not_depend_on_gain_and_offset_of_the_grey_values():
+    image = breast_image()
+    first, second = analyse(image, PIXEL_MM, "CC"), analyse(3.0 * image + 500.0, PIXEL_MM, "CC")
+    assert first.outline == pytest.approx(second.outline, abs=1e-2)
+
+
+def test_finer_pixels_give_the_same_outline_in_mm():
+    coarse = analyse(breast_image(), PIXEL_MM, "CC")
+    fine = analyse(np.repeat(np.repeat(breast_image(), 3, axis=0), 3, axis=1), PIXEL_MM / 3.0, "CC")
+    back = (fine.outline + 0.5) / 3.0 - 0.5
+    nearest = np.linalg.norm(back[:, None] - coarse.outline[None], axis=2).min(axis=1) * PIXEL_MM
+    assert np.percentile(nearest, 95) < 0.6
+    assert fine.mask.shape == (3 * SHAPE[0], 3 * SHAPE[1])
+
+
+def test_pectoral_muscle_is_found_in_mlo_and_takes_the_weight_there():
+    found = analyse(with_pectoral(breast_image()), PIXEL_MM, "MLO")
+    row, column = np.indices(SHAPE)
+    true = (column / 130.0 + (row - 120.0) / 280.0 < 1.0) & (inside_share() < 1.0)
+    assert found.pectoral is not None
+    assert 2.0 * (found.pectoral & true).sum() / (found.pectoral.sum() + true.sum()) > 0.9
+    upper = found.outline[:, 1] < 120.0
+    assert found.outline_weight[upper].max() < 1.0
+    assert (found.outline_weight[~upper] == 1.0).any()
+
+
+def test_mlo_without_pectoral_muscle_finds_none():
+    assert analyse(breast_image(), PIXEL_MM, "MLO").pectoral is None
+
+
+def test_nipple_in_profile_is_found_and_a_smooth_outline_has_none():
+    image = breast_image()
+    assert analyse(image, PIXEL_MM, "CC").nipple is None
+    row, column = np.indices(SHAPE)
+    tip = np.hypot(column - DEPTH_MM / PIXEL_MM, row - MIDDLE_ROW - 20.0) * PIXEL_MM < 4.5
+    nipple = analyse(np.where(tip, 600.0, image), PIXEL_MM, "CC").nipple
+    assert nipple is not None
+    assert np.hypot(*(nipple - [DEPTH_MM / PIXEL_MM + 16.0, MIDDLE_ROW + 20.0])) * PIXEL_MM < 2.5
+
+
+def test_breast_away_from_the_chest_wall_is_refused():
+    image = np.roll(breast_image(), 150, axis=1)
+    image[:, :150] = 40.0
+    with pytest.raises(DataError, match="chest-wall edge"):
+        analyse(image, PIXEL_MM, "CC")
+
+
+def test_region_smaller_than_a_breast_is_refused():
+    image = np.random.default_rng(0).normal(20.0, 2.0, (400, 300))
+    image[100:200, :50] = 500.0
+    with pytest.raises(DataError, match="no breast"):
+        analyse(image, PIXEL_MM, "CC")

@@ -1,0 +1,133 @@
+"""Flips between stored and canonical mammograms."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mammoreg.errors import DataError
+from mammoreg.geometry.frames import plate_rotation
+from mammoreg.imaging.mammogram_canonical import canonicalise
+from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation
+from tests.unit.mammogram_images import breast_image
+
+
+@pytest.mark.parametrize(
+    ("orientation", "laterality", "view", "rows", "columns"),
+    [
+        ("A\\R", "L", "CC", False, False),
+        ("P\\L", "R", "CC", False, True),
+        ("A\\FR", "L", "MLO", False, False),
+        ("P\\FL", "R", "MLO", False, True),
+        ("A\\L", "R", "CC", False, False),
+        ("A\\FL", "R", "MLO", False, False),
+        ("P\\HR", "R", "MLO", True, True),
+        ("A\\L", "L", "CC", True, False),
+        ("A\\F", "L", "MLO", False, False),
+        ("A\\H", "R", "MLO", True, False),
+        ("p\\fl", "R", "MLO", False, True),
+        ("PL\\L", "R", "CC", False, True),
+    ],
+)
+def test_flips_of_the_contract(orientation, laterality, view, rows, columns):
+    assert flips_of_orientation(orientation, laterality, view) == Flips(rows, columns)
+
+
+def test_rows_as_usually_stored_follow_the_plate_frame_towards_medial():
+    # Contract: (-s cos a, 0, -sin a) in LPS, s = +1 for a left breast; the breast frame mirrors x of a left breast.
+    angle = np.deg2rad(37.0)
+    for s in (1.0, -1.0):
+        in_lps = np.array([-s * np.cos(angle), 0.0, -np.sin(angle)])
+        in_breast = in_lps * np.array([-s, 1.0, 1.0])
+        assert plate_rotation(37.0)[0] == pytest.approx(in_breast)
+
+
+@pytest.mark.parametrize(
+    ("orientation", "laterality", "view", "words"),
+    [
+        ("L\\P", "R", "CC", "antero-posterior"),
+        ("A", "R", "CC", "pair of directions"),
+        ("A\\X", "R", "CC", "pair of directions"),
+        ("AP\\L", "R", "CC", "pair of directions"),
+        ("A\\F", "R", "CC", "does not tell"),
+        ("A\\FL", "L", "MLO", "contradicts"),
+    ],
+)
+def test_orientation_that_cannot_be_used_names_itself(orientation, laterality, view, words):
+    with pytest.raises(DataError, match=words) as caught:
+        flips_of_orientation(orientation, laterality, view)
+    assert repr(orientation) in str(caught.value)
+
+
+@given(st.booleans(), st.booleans(), st.integers(2, 9), st.integers(2, 9))
+def test_flips_undo_themselves_and_pixels_follow_the_image(rows, columns, height, width):
+    flips, image = Flips(rows, columns), np.arange(height * width).reshape(height, width)
+    flipped = flips.apply(image)
+    assert np.array_equal(flips.apply(flipped), image)
+    places = np.array([[width - 1, 0], [0, height - 1], [1, 1]], dtype=float)
+    moved = flips.apply_to_pixels(places, (height, width)).astype(int)
+    assert np.array_equal(flipped[moved[:, 1], moved[:, 0]], image[places[:, 1].astype(int), places[:, 0].astype(int)])
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(False, False), (True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("dark", [False, True])
+@pytest.mark.parametrize("laterality", ["L", "R"])
+def test_every_storage_gives_the_same_canonical_image(rows, columns, dark, laterality):
+    image = breast_image()
+    stored = Flips(rows, columns).apply(4095.0 - image if dark else image)
+    medial, lateral = ("R", "L") if laterality == "L" else ("L", "R")
+    orientation = f"{'P' if columns else 'A'}\\{lateral if rows else medial}"
+    photometric = "MONOCHROME1" if dark else "MONOCHROME2"
+    got = canonicalise(stored, laterality, "CC", orientation=orientation, photometric=photometric)
+    assert got.flips == Flips(rows, columns)
+    assert got.flags == ()
+    assert got.estimated == ()
+    offset = got.pixels - image
+    assert np.ptp(offset) < 1e-2
+
+
+def test_image_edge_that_contradicts_the_orientation_is_refused():
+    with pytest.raises(DataError, match="shows air"):
+        canonicalise(breast_image(), "R", "CC", orientation="P\\L")
+
+
+def test_polarity_that_contradicts_the_air_is_flagged_and_mended():
+    wrong = canonicalise(4095.0 - breast_image(), "R", "CC", orientation="A\\L", photometric="MONOCHROME2")
+    right = canonicalise(4095.0 - breast_image(), "R", "CC", orientation="A\\L", photometric="MONOCHROME1")
+    assert wrong.flags == ("polarity contradicts the air at the border",)
+    assert right.flags == ()
+    assert np.array_equal(wrong.pixels, right.pixels)
+
+
+def test_without_orientation_the_air_tells_the_chest_wall():
+    image = breast_image()
+    got = canonicalise(image[:, ::-1], "R", "CC", photometric="MONOCHROME2")
+    assert got.estimated == ("orientation",)
+    assert np.array_equal(got.pixels, image)
+
+
+def test_blank_margin_at_the_chest_wall_does_not_pass_for_the_nipple_side():
+    image = breast_image(noise=0.0)
+    image[:, :12] = 40.0
+    assert not canonicalise(image, "L", "CC", photometric="MONOCHROME2").flips.columns
+
+
+def test_unprocessed_data_become_attenuation():
+    attenuation = breast_image(noise=0.0, air=0.0) / 1000.0
+    exposure = 12000.0 * np.exp(-attenuation)
+    got = canonicalise(exposure, "L", "CC", orientation="A\\R", photometric="MONOCHROME1", linear=True)
+    assert got.flags == ()
+    assert np.allclose(got.pixels, attenuation, atol=1e-4)
+
+
+@pytest.mark.parametrize("value", [0.0, np.nan])
+def test_image_without_breast_is_refused(value):
+    noise = np.random.default_rng(0).normal(100.0, 2.0, (200, 150))
+    noise[50, 50] = value if np.isnan(value) else noise[50, 50]
+    with pytest.raises(DataError, match="not finite" if np.isnan(value) else "no breast"):
+        canonicalise(noise, "L", "CC")
+
+
+def test_constant_image_is_refused():
+    with pytest.raises(DataError, match="no breast"):
+        canonicalise(np.full((200, 150), 7), "L", "CC")
