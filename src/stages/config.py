@@ -25,7 +25,7 @@ class CohortKeys(BaseModel):
     )
     results: str = Field("results", min_length=1, description="Folder for all results.")
 
-    def tables(self, project: Path) -> tuple[Path, Path | None]:
+    def table_files(self, project: Path) -> tuple[Path, Path | None]:
         """Both tables; those of the embedded cohort lie in the project's folder."""
         if self.cases is None:
             return project / EMBEDDED / "cases.tsv", project / EMBEDDED / "views.tsv"

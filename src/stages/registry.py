@@ -1,4 +1,4 @@
-"""The stages by name, in the order of the pipeline."""
+"""The stages by name and by what they run for: a case, a view of a case, or the cohort."""
 
 import importlib
 from typing import cast
@@ -7,23 +7,13 @@ from stages.contract import Stage
 from stages.digest import module_digest
 from stages.errors import UserError
 
-PIPELINE = (
-    "digital",
-    "segment",
-    "mesh",
-    "calibrate",
-    "pose",
-    "compress",
-    "shape",
-    "solve",
-    "project",
-    "localize",
-    "evaluate",
-    "figures",
-    "tables",
-    "report",
-)
-STAGE_MODULES = {name: f"stages.{name}" for name in PIPELINE} | {"error_vs_runtime": "stages.studies.runtime"}
+CASE_STAGES = ("segment", "mesh", "localize", "evaluate", "figures")
+VIEW_STAGES = ("pose", "compress", "shape", "solve", "project")
+COHORT_STAGES = ("calibrate", "tables", "report")
+STUDIES = {"runtime": "case", "error_vs_runtime": "cohort"}
+STAGE_MODULES = {name: f"stages.{name}" for name in ("digital", *CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES)} | {
+    name: f"stages.studies.{name}" for name in STUDIES
+}
 
 
 def load_stage(name: str) -> Stage:

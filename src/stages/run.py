@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from mammoreg.errors import DataError, NotConvergedError
-from stages.artefact import Artefact, Fields, Status, write_artefact, write_bytes
+from stages.artefact import Artefact, Fields, write_artefact, write_bytes
 from stages.contract import Inputs, Stage, Subject
 from stages.errors import UserError
 from stages.registry import STAGE_MODULES, load_stage, stage_digest
@@ -19,7 +19,7 @@ from stages.registry import STAGE_MODULES, load_stage, stage_digest
 InputPaths = Mapping[str, Path | Sequence[Path]]
 
 
-def run_stage(name: str, inputs: InputPaths, output: Path, settings: Mapping[str, Any], subject: Subject) -> Status:
+def run_stage(name: str, inputs: InputPaths, output: Path, settings: Mapping[str, Any], subject: Subject) -> Fields:
     """Run a stage and write its artefact.
 
     Args:
@@ -30,7 +30,7 @@ def run_stage(name: str, inputs: InputPaths, output: Path, settings: Mapping[str
         subject: case, side and view.
 
     Returns:
-        The status that the artefact carries.
+        What the artefact holds.
 
     Raises:
         UserError: settings or inputs do not fit the stage, or the artefact cannot be written.
@@ -40,7 +40,7 @@ def run_stage(name: str, inputs: InputPaths, output: Path, settings: Mapping[str
 
 def execute(
     stage: Stage, code: str, inputs: InputPaths, output: Path, settings: Mapping[str, Any], subject: Subject
-) -> Status:
+) -> Fields:
     """As `run_stage`, for a stage record and the digest of its code."""
     model = validated(stage, settings)
     opened, ids = _open(stage, inputs)
@@ -48,7 +48,7 @@ def execute(
     for name, content in fields.files.items():
         write_bytes(output.parent / (stage.folder or stage.name) / name, content)
     write_artefact(output, _header(stage, code, ids, model, subject), fields)
-    return fields.status
+    return fields
 
 
 def validated(stage: Stage, settings: Mapping[str, Any]) -> BaseModel:

@@ -1,0 +1,114 @@
+"""A copy of the project whose stages compute next to nothing, to test the workflow itself in seconds."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import nibabel
+import numpy as np
+from PIL import Image
+
+PROJECT = Path(__file__).resolve().parents[2]
+INPUTS = {
+    "segment": (("mr",), ("mr_labels", "mr_compressed")),
+    "mesh": (("segment",), ()),
+    "calibrate": ((), ()),
+    "pose": (("segment", "mesh"), ("image",)),
+    "compress": (("mesh", "segment", "pose", "calibrate"), ()),
+    "shape": (("compress", "pose", "mesh", "segment"), ()),
+    "solve": (("mesh", "compress", "shape", "calibrate"), ()),
+    "project": (("segment", "mesh", "pose", "compress", "solve"), ()),
+    "localize": (
+        ("segment", "mesh"),
+        ("pose", "compress", "solve", "mr_lesion", "mr_landmarks", "lesion_CC", "lesion_MLO"),
+    ),
+    "evaluate": (("localize",), ("mr_compressed_landmarks", "landmarks_CC", "landmarks_MLO")),
+    "figures": (("segment", "mesh"), ("pose", "project", "localize", "evaluate")),
+    "tables": (("cases",), ("views", "localize", "evaluate", "calibrate")),
+    "report": (("cases", "tables"), ("views", "figures", "evaluate")),
+    "runtime": (("segment", "mesh"), ("pose",)),
+    "error_vs_runtime": (("runtime",), ()),
+    "digital": ((), ()),
+}
+TAKES_FAILED = ("evaluate", "figures", "tables", "report", "error_vs_runtime")
+
+TOY_STAGE = '''
+import numpy as np
+from pydantic import Field
+from mammoreg.errors import DataError
+from stages.contract import Array, Fields, SettingsModel, Stage
+
+class Settings(SettingsModel):
+    """Settings of a stage that computes next to nothing."""
+    level: float = Field(1.0, ge=0, description="a number")
+
+def run(inputs, settings, subject):
+    mr = inputs.path("mr")
+    if mr is not None:
+        import nibabel
+        if np.isnan(np.asanyarray(nibabel.load(mr).dataobj)).any():
+            raise DataError(f"{{mr}}: holds NaN; export the volume again")
+    failed = [a for found in inputs.stages.values() for a in found if not a.ok]
+    status = {{"status": failed[0].status, "message": failed[0].message}} if failed and {name!r} == "evaluate" else {{}}
+    files = {{"report.html": b"report"}} if {name!r} == "report" else {{}}
+    return Fields(arrays={{"level": Array(np.full(3, settings.level), "1", "level")}}, files=files, **status)
+
+STAGE = Stage({name!r}, 1, {required!r}, Settings, run, {optional!r}, {takes_failed!r}, {folder!r})
+'''
+
+
+def make_project(folder: Path) -> Path:
+    """Copy the workflow and the stages' machinery, with toy stages in place of the numerics."""
+    for name in ("Snakefile", "workflow", "profiles", "config"):
+        source = PROJECT / name
+        (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PROJECT / "src", folder / "src", ignore=ignored)
+    (folder / "src/stages/studies").mkdir(exist_ok=True)
+    (folder / "src/stages/studies/__init__.py").write_text('"""Studies."""\n')
+    for name, (required, optional) in INPUTS.items():
+        module = folder / "src/stages" / ("studies" if name in ("runtime", "error_vs_runtime") else "") / f"{name}.py"
+        shutil.rmtree(module.with_suffix(""), ignore_errors=True)
+        module.write_text(
+            TOY_STAGE.format(
+                name=name,
+                required=required,
+                optional=optional,
+                takes_failed=name in TAKES_FAILED,
+                folder="." if name == "report" else None,
+            )
+        )
+    (folder / "config/config.yaml").write_text("results: results\n")
+    return folder
+
+
+def make_cohort(folder: Path, cases: tuple[str, ...] = ("a", "b", "c")) -> Path:
+    """Tables and small files of a cohort: each case an MR volume and a CC and MLO picture."""
+    folder.mkdir(parents=True)
+    rng = np.random.default_rng(1)
+    case_lines, view_lines = ["case\tlaterality\tmr"], ["case\tview\timage\tpixel_spacing_mm\tthickness_mm"]
+    for case in cases:
+        volume = rng.normal(size=(10, 11, 12)).astype(np.float32)
+        nibabel.save(nibabel.Nifti1Image(volume, np.diag([1.4, 1.4, 1.4, 1.0])), folder / f"{case}.nii.gz")
+        case_lines.append(f"{case}\tR\t{case}.nii.gz")
+        for view in ("CC", "MLO"):
+            Image.fromarray(rng.integers(0, 255, (30, 20), dtype=np.uint8)).save(folder / f"{case}_{view}.png")
+            view_lines.append(f"{case}\t{view}\t{case}_{view}.png\t0.2\t50")
+    (folder / "cases.tsv").write_text("\n".join(case_lines) + "\n")
+    (folder / "views.tsv").write_text("\n".join(view_lines) + "\n")
+    return folder
+
+
+def spoil(volume: Path) -> None:
+    """Make a NIfTI volume NaN throughout."""
+    image = nibabel.load(volume)
+    nibabel.save(nibabel.Nifti1Image(np.full(image.shape, np.nan, np.float32), image.affine), volume)
+
+
+def snakemake(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run Snakemake in a project's copy."""
+    environment = os.environ | {"PYTHONPATH": str(project / "src")}
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    return subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)

@@ -1,0 +1,168 @@
+# What every rule shares: the checked configuration, the cohort, and where files lie.
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+from snakemake.settings.types import ExecMode
+
+from stages.cases import read_cohort
+from stages.config import read_config, stage_settings
+from stages.errors import FaultsError, UserError
+from stages.preflight import check_cohort
+from stages.registry import (
+    CASE_STAGES,
+    COHORT_STAGES,
+    STAGE_MODULES,
+    STUDIES,
+    VIEW_STAGES,
+    load_stage,
+    stage_digest,
+)
+
+PROJECT = Path(workflow.basedir)
+
+
+def checked(function, *arguments):
+    """The function's result; a user's mistake ends Snakemake with its message alone."""
+    try:
+        return function(*arguments)
+    except UserError as error:
+        raise WorkflowError(str(error)) from None
+
+
+CONFIG = checked(read_config, config)
+COHORT = checked(read_cohort, *CONFIG.table_files(PROJECT))
+RESULTS = Path(CONFIG.results)
+config["case_count"] = len(COHORT.cases)
+TABLES = {
+    name: path
+    for name, path in (("cases", COHORT.cases_file), ("views", COHORT.views_file))
+    if path
+}
+
+
+wildcard_constraints:
+    case="[A-Za-z0-9_-]+",
+    view="CC|MLO|3D",
+
+
+def made_files():
+    """Files of the tables that rule `digital` makes, by case; none unless the embedded cohort runs."""
+    if CONFIG.cases is not None:
+        return {}
+    rows = (*COHORT.cases.values(), *COHORT.mammograms.values())
+    found = {case: set() for case in COHORT.cases}
+    for row in rows:
+        found[row.case].update(row.files().values())
+    return {case: sorted(files) for case, files in found.items()}
+
+
+MADE = made_files()
+if workflow.exec_mode == ExecMode.DEFAULT:
+    faults = check_cohort(COHORT, {file for files in MADE.values() for file in files})
+    if faults:
+        raise WorkflowError(str(FaultsError(faults)))
+
+
+def scope(stage):
+    """Whether a stage runs per case, per view or once per cohort."""
+    if stage in VIEW_STAGES:
+        return "view"
+    return "cohort" if stage in COHORT_STAGES else STUDIES.get(stage, "case")
+
+
+def named(stage, folder="", suffix=".h5"):
+    """Pattern of a stage's artefact, or of its log or benchmark in the folder of that name."""
+    pattern = {
+        "view": "{case}/" + stage + ".{view}",
+        "case": "{case}/" + stage,
+        "cohort": stage,
+    }[scope(stage)]
+    return str(RESULTS / folder / (pattern + suffix))
+
+
+def log_of(stage):
+    return named(stage, "logs", ".log")
+
+
+def benchmark_of(stage):
+    return named(stage, "benchmarks", ".tsv")
+
+
+def case_row(case):
+    if case not in COHORT.cases:
+        raise WorkflowError(
+            f"no case {case!r} in {COHORT.cases_file}; its cases are {', '.join(COHORT.cases)}"
+        )
+    return COHORT.cases[case]
+
+
+def artefacts_of(stage, case=None, view=None):
+    """Artefacts of a stage: of one view, of all views of a case, or of all cases."""
+    cases = COHORT.cases if case is None else [case]
+    if scope(stage) == "cohort":
+        return [named(stage)]
+    if scope(stage) == "case":
+        return [
+            named(stage).format(case=c)
+            for c in cases
+            if COHORT.views(c) or stage not in ("localize", "evaluate")
+        ]
+    views = {c: COHORT.views(c) if view is None else [view] for c in cases}
+    return [named(stage).format(case=c, view=v) for c in cases for v in views[c]]
+
+
+def files_of(case, view=None):
+    """Files of the tables that a case, or one of its views, names; a folder stands for the files in it."""
+    files = dict(case_row(case).files())
+    for (owner, name), row in COHORT.mammograms.items():
+        if owner == case:
+            files |= {
+                f"{column}_{name}" if view is None else column: p
+                for column, p in row.files().items()
+                if view in (None, name)
+            }
+    return {
+        n: sorted(map(str, p.iterdir())) if p.is_dir() else str(p)
+        for n, p in files.items()
+    }
+
+
+def inputs_of(stage):
+    """Input function of a stage: what its record declares and the cohort has."""
+    record = load_stage(stage)
+
+    def inputs(wildcards):
+        case, view = wildcards.get("case"), wildcards.get("view")
+        files = (
+            files_of(case, view)
+            if case
+            else {name: str(path) for name, path in TABLES.items()}
+        )
+        found = {}
+        for name in (*record.inputs, *record.optional):
+            if name in STAGE_MODULES:
+                found[name] = artefacts_of(name, case, view)
+            elif name in files:
+                found[name] = files[name]
+        return {name: paths for name, paths in found.items() if paths}
+
+    return inputs
+
+
+def subject_of(wildcards):
+    """Side, view and values of the tables' rows, as the stage gets them."""
+    case, view = wildcards.get("case"), wildcards.get("view")
+    if case is None:
+        return {"case": "cohort"}
+    row = case_row(case)
+    mammogram = COHORT.mammograms.get((case, view))
+    values = row.values() | (mammogram.values() if mammogram else {})
+    return {"case": case, "laterality": row.laterality, "view": view, "row": values}
+
+
+def settings_of(stage):
+    return stage_settings(CONFIG, stage)
+
+
+def complete_file():
+    return str(RESULTS / "tables" / "complete.txt")

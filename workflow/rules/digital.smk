@@ -1,0 +1,25 @@
+# The embedded cohort: one rule a patient, whose outputs are the files that config/digital's tables name.
+for case, files in MADE.items():
+
+    rule:
+        name:
+            f"digital_{case}"
+        output:
+            str(PROJECT / "results" / "digital" / case / "digital.h5"),
+            *map(str, files),
+        log:
+            str(PROJECT / "results" / "digital" / "logs" / f"{case}.log"),
+        benchmark:
+            str(PROJECT / "results" / "digital" / "benchmarks" / f"{case}.tsv")
+        params:
+            stage="digital",
+            settings=settings_of("digital"),
+            code=stage_digest("digital"),
+            subject={"case": case, "laterality": case_row(case).laterality},
+        resources:
+            mem_mb=lambda wildcards, attempt: 1500 * attempt,
+            runtime=20,
+        message:
+            f"{case}: digital patient"
+        script:
+            "../scripts/stage.py"
