@@ -1,0 +1,131 @@
+"""Sparse direct solver with a pattern that is analysed once: MKL PARDISO, or SuperLU where MKL is missing."""
+
+import ctypes
+import weakref
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from mammoreg.errors import NotConvergedError
+
+try:
+    import pypardiso
+except ImportError:  # the wrapper, or the MKL library that it looks for, is not installed
+    pypardiso = None
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+_UNSYMMETRIC, _SYMMETRIC_INDEFINITE = 11, -2
+_ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+
+
+class PardisoSolver:
+    """PARDISO for one sparsity pattern (CSR, zero-based; the upper triangle if symmetric)."""
+
+    def __init__(self, indptr: Indices, indices: Indices, symmetric: bool) -> None:
+        self._indptr, self._indices = np.ascontiguousarray(indptr), np.ascontiguousarray(indices)
+        self._size = len(indptr) - 1
+        self._type = _SYMMETRIC_INDEFINITE if symmetric else _UNSYMMETRIC
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._iparm = np.zeros(64, dtype=np.int32)
+        self._iparm[0] = 1  # no defaults
+        self._iparm[1] = 2  # nested dissection
+        self._iparm[7] = 2  # refinement steps at most
+        self._iparm[9] = 8 if symmetric else 13  # pivots perturbed by 10^-this
+        self._iparm[10] = self._iparm[12] = 0 if symmetric else 1  # scaling and matching
+        self._iparm[20] = 1  # Bunch-Kaufman pivots
+        self._iparm[34] = 1  # zero-based
+        self._analysed = False
+        weakref.finalize(self, _release, self._handle, self._type, self._size, self._iparm.copy())
+
+    def solve(self, values: Array, rhs: Array) -> Array:
+        """Factorise the matrix with these entries and solve for one right-hand side."""
+        if not (np.isfinite(values).all() and np.isfinite(rhs).all()):
+            raise NotConvergedError("the linear system holds values that are not finite")
+        if not self._analysed:
+            self._call(_ANALYSE, values, rhs)
+            self._analysed = True
+        self._call(_FACTORISE, values, rhs)
+        return self._call(_SOLVE, values, rhs)
+
+    @property
+    def negative_eigenvalues(self) -> int | None:
+        """Of the last factorised matrix, if symmetric: more than zero marks an unstable equilibrium."""
+        return int(self._iparm[22]) if self._type == _SYMMETRIC_INDEFINITE else None
+
+    def _call(self, phase: int, values: Array, rhs: Array) -> Array:
+        solution = np.zeros(self._size)
+        error = _pardiso(
+            self._handle, self._type, phase, self._size, values, self._indptr, self._indices, self._iparm, rhs, solution
+        )
+        if error != 0:
+            raise NotConvergedError(f"the linear solver failed (PARDISO error {error} in phase {phase})")
+        return solution
+
+
+def _pardiso(
+    handle: NDArray[np.int64],
+    kind: int,
+    phase: int,
+    size: int,
+    values: Array,
+    indptr: Indices,
+    indices: Indices,
+    iparm: Indices,
+    rhs: Array,
+    solution: Array,
+) -> int:
+    """One call of MKL's pardiso; its error code."""
+    error, unused = ctypes.c_int32(0), np.zeros(1, dtype=np.int32)
+    pypardiso.ps.libmkl.pardiso(
+        _pointer(handle, ctypes.c_int64), _integer(1), _integer(1), _integer(kind), _integer(phase), _integer(size),
+        _pointer(values, ctypes.c_double), _pointer(indptr, ctypes.c_int32), _pointer(indices, ctypes.c_int32),
+        _pointer(unused, ctypes.c_int32), _integer(1), _pointer(iparm, ctypes.c_int32), _integer(0),
+        _pointer(rhs, ctypes.c_double), _pointer(solution, ctypes.c_double), ctypes.byref(error),
+    )  # fmt: skip
+    return error.value
+
+
+def _release(handle: NDArray[np.int64], kind: int, size: int, iparm: Indices) -> None:
+    """Give a solver's memory back to MKL."""
+    none, empty = np.zeros(1, dtype=np.int32), np.zeros(1)
+    _pardiso(handle, kind, _RELEASE, size, empty, none, none, iparm, empty, empty)
+
+
+class SuperLuSolver:
+    """SciPy's SuperLU with the interface of `PardisoSolver`; slower."""
+
+    negative_eigenvalues: int | None = None
+
+    def __init__(self, indptr: Indices, indices: Indices, symmetric: bool) -> None:
+        self._indptr, self._indices, self._symmetric = indptr, indices, symmetric
+
+    def solve(self, values: Array, rhs: Array) -> Array:
+        """Factorise the matrix with these entries and solve for one right-hand side."""
+        size = len(self._indptr) - 1
+        matrix = sp.csr_array((values, self._indices, self._indptr), shape=(size, size))
+        if self._symmetric:
+            matrix = matrix + sp.triu(matrix, 1).T
+        try:
+            return np.asarray(splu(sp.csc_array(matrix)).solve(rhs))
+        except RuntimeError as error:
+            raise NotConvergedError(f"the linear solver failed ({error})") from error
+
+
+def linear_solver(indptr: Indices, indices: Indices, symmetric: bool) -> PardisoSolver | SuperLuSolver:
+    """The fastest solver at hand for a pattern."""
+    kind: Any = PardisoSolver if pypardiso is not None else SuperLuSolver
+    solver: PardisoSolver | SuperLuSolver = kind(indptr, indices, symmetric)
+    return solver
+
+
+def _integer(value: int) -> Any:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _pointer(array: NDArray[Any], kind: Any) -> Any:
+    return array.ctypes.data_as(ctypes.POINTER(kind))

@@ -1,0 +1,50 @@
+"""Guess of the deformation at the next plate gap: affine, volume kept (design note on the solver, recipe 2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mammoreg.contact.plate import Array, Plate
+from mammoreg.fem.boundary import BackCondition, Integers
+
+FADE_MM = 25.0
+"""Distance over which the squeeze fades out behind the plates' edge, and the spread in front of a held back."""
+
+
+@dataclass(frozen=True)
+class AffinePredictor:
+    """Squeezes heights by the ratio of the gaps and spreads the rest by its inverse square root.
+
+    Attributes:
+        reach: share (N,) of the spread that a node takes part in: 0 on a held back, 1 far from it.
+    """
+
+    reach: Array
+
+    def predict(self, positions: Array, height: float, plates: Sequence[Plate], ratio: float) -> Array:
+        """Nodes (N, 3) for plates (lower, upper) whose gap has shrunk by `ratio`, both shifted by `height`."""
+        lower, upper = plates
+        low, high = lower.height_mm + height, upper.height_mm + height
+        imaged = np.ones(len(positions))
+        if lower.edge_p_mm is not None:
+            imaged = np.clip(1.0 - (positions[:, 1] - lower.edge_p_mm) / FADE_MM, 0.0, 1.0)
+        squeeze = 1.0 + imaged * (ratio - 1.0)
+        spread = 1.0 + self.reach * imaged * (ratio**-0.5 - 1.0)
+        centre = positions.mean(axis=0)
+        root = positions[:, 1].max()
+        moved = positions.copy()
+        moved[:, 2] = 0.5 * (low + high) + squeeze * (positions[:, 2] - 0.5 * (low + high))
+        moved[:, 2] = np.where(imaged >= 1.0, np.clip(moved[:, 2], low, high), moved[:, 2])
+        moved[:, 0] = centre[0] + spread * (positions[:, 0] - centre[0])
+        moved[:, 1] = root + spread * (positions[:, 1] - root)
+        return moved
+
+
+def affine_predictor(points: Array, back: BackCondition) -> AffinePredictor:
+    """Predictor of a body: the spread grows from zero at nodes held across the plates' direction."""
+    pinned: Integers = back.nodes[back.held[:, :2].all(axis=1)]
+    if len(pinned) == 0:
+        return AffinePredictor(np.ones(len(points)))
+    nearest = np.linalg.norm(points[:, None] - points[pinned][None], axis=-1).min(axis=1)
+    return AffinePredictor(np.clip(nearest / FADE_MM, 0.0, 1.0))

@@ -1,0 +1,126 @@
+"""Interior of a body whose skin is prescribed: the `updated` boundary conditions (paper, II-C)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mammoreg.errors import NotConvergedError
+from mammoreg.fem.boundary import Array, BackCondition
+from mammoreg.fem.equilibrium import Equilibrium, Load, NewtonOptions, Record, State
+from mammoreg.fem.model import HyperelasticModel
+
+
+@dataclass(frozen=True)
+class PrescribedOptions:
+    """Steps of the way from the start to the prescribed places.
+
+    Attributes:
+        first_step, least_step: share of the way in the first step, and the smallest before giving up.
+        easy_iterations: a step of at most this many Newton iterations doubles the next one.
+        newton: when an iteration ends.
+    """
+
+    first_step: float = 1.0
+    least_step: float = 1.0 / 64.0
+    easy_iterations: int = 8
+    newton: NewtonOptions = field(default_factory=NewtonOptions)
+
+
+@dataclass(frozen=True)
+class PrescribedResult:
+    """A body with prescribed nodes, in the frame of its points.
+
+    Attributes:
+        deformed: nodes (N, 3), mm.
+        pressure: element pressures (E,), kPa, positive in tension.
+        iterations, steps, cuts, residuals: as in `CompressionResult`.
+        energy_mj: isochoric strain energy, mJ.
+        min_det_f: smallest det F at a Gauss point.
+        volume_change: relative change of the whole volume.
+        reaction_n: force (3,) that holds the prescribed nodes.
+    """
+
+    deformed: Array
+    pressure: Array
+    iterations: int
+    steps: int
+    cuts: int
+    residuals: list[float]
+    energy_mj: float
+    min_det_f: float
+    volume_change: float
+    reaction_n: Array
+
+
+def solve_prescribed(
+    model: HyperelasticModel,
+    nodes: NDArray[np.integer],
+    targets: Array,
+    back: BackCondition | None = None,
+    start: Array | None = None,
+    pressure: Array | None = None,
+    options: PrescribedOptions | None = None,
+) -> PrescribedResult:
+    """Move nodes (B,) to targets (B, 3), mm, in steps; the rest finds its equilibrium.
+
+    Args:
+        model: the body.
+        nodes: prescribed in all components.
+        targets: where they end.
+        back: condition of back nodes that are not prescribed.
+        start: nodes (N, 3) from which to go, det F > 0; default the undeformed body.
+        pressure: element pressures (E,) at the start, kPa; default zero.
+        options: steps.
+
+    Raises:
+        NotConvergedError: with the reason and how far the nodes came.
+    """
+    options = options if options is not None else PrescribedOptions()
+    held, goal = _held(model, nodes, targets, back)
+    origin = model.points if start is None else np.asarray(start, dtype=float)
+    state = State(origin, np.zeros(len(model.hexes)) if pressure is None else pressure)
+    equilibrium = Equilibrium(model, held, back)
+    anchors = model.points + (0.0 if back is None else back.pull_mm)
+    record, done, step, steps, cuts = Record(), 0.0, options.first_step, 0, 0
+    while done < 1.0:
+        share = min(1.0, done + step)
+        load = Load((), origin + share * (goal - origin), anchors)
+        before = len(record.residuals)
+        try:
+            state = equilibrium.solve(state, load, options.newton, record)
+        except NotConvergedError as error:
+            cuts, step = cuts + 1, 0.5 * step
+            if step < options.least_step:
+                raise NotConvergedError(f"{error}; the prescribed nodes came {done:.0%} of their way") from error
+            continue
+        done, steps = share, steps + 1
+        if len(record.residuals) - before <= options.easy_iterations:
+            step *= 2.0
+    forces = equilibrium.forces(state, Load((), goal, anchors))
+    return PrescribedResult(
+        deformed=state.positions,
+        pressure=state.pressure,
+        iterations=len(record.residuals),
+        steps=steps,
+        cuts=cuts,
+        residuals=record.residuals,
+        energy_mj=model.energy_mj(state.positions),
+        min_det_f=float(model.determinants(state.positions).min()),
+        volume_change=model.volume_change(state.positions),
+        reaction_n=1e-3 * forces.residual[:-1].reshape(-1, 3)[nodes].sum(axis=0),
+    )
+
+
+def _held(
+    model: HyperelasticModel, nodes: NDArray[np.integer], targets: Array, back: BackCondition | None
+) -> tuple[NDArray[np.bool_], Array]:
+    """Held components (N, 3) and where they end (N, 3)."""
+    held = np.zeros(model.points.shape, dtype=bool)
+    goal = model.points.copy()
+    if back is not None:
+        held[back.nodes] = back.held
+        goal[back.nodes] += back.pull_mm
+    held[nodes] = True
+    goal[nodes] = targets
+    return held, goal
