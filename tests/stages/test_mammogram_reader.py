@@ -124,7 +124,7 @@ def test_header_that_cannot_be_used(tmp_path, changes, words):
 
 
 def test_number_of_the_table_that_is_none(tmp_path):
-    with pytest.raises(DataError, match="thickness_mm '5 cm' of a.dcm is not a number"):
+    with pytest.raises(DataError, match=r"thickness_mm '5 cm' of a\.dcm is not a number"):
         read_mammogram_facts(_dicom(tmp_path / "a.dcm"), {"thickness_mm": "5 cm"}, "R", "CC")
 
 

@@ -1,5 +1,7 @@
 """Projection of volumes of the plate frame onto the detector."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,23 +25,44 @@ def project_volume(volume: Volume, view: ViewGeometry, step: int = 4) -> Image:
     sum of zoomed slices times the length of the beam within one of them.
 
     Args:
-        volume: samples per mm (attenuation) or without unit (mask) in the plate frame; zero outside its grid.
+        volume: samples, such as attenuation in 1/mm, in the plate frame; zero outside its grid.
         view: cone beam, or parallel beams.
         step: side of the blocks of pixels, the middles of which are computed.
 
     Returns:
-        Image (ceil(rows / step), ceil(columns / step)), canonical: attenuation without unit, or mm for a mask.
+        Image (ceil(rows / step), ceil(columns / step)), canonical; without unit for an attenuation in 1/mm.
     """
+    along, forward = _detector_mm(view, step)
+    image: Image = np.zeros((len(along), len(forward)), dtype=np.float32)
+    for zoomed in _zoomed_slices(volume, view, along, forward):
+        image += zoomed
+    return np.asarray(image * float(volume.spacing[2]) * _obliquity(along, forward, view), dtype=np.float32)
+
+
+def project_shadow(mask: Volume, view: ViewGeometry, step: int = 4) -> NDArray[np.bool_]:
+    """Silhouette of a mask (0 to 1) of the plate frame: where a beam meets values above 0.5; arguments as above."""
+    along, forward = _detector_mm(view, step)
+    shadow: NDArray[np.bool_] = np.zeros((len(along), len(forward)), dtype=bool)
+    for zoomed in _zoomed_slices(mask, view, along, forward):
+        shadow |= zoomed > 0.5
+    return shadow
+
+
+def _detector_mm(view: ViewGeometry, step: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places along the chest-wall edge, from the middle row, and forward of it, mm at the detector."""
     rows, columns = detector_pixels(view, step)
-    along = (rows - 0.5 * (view.rows - 1)) * view.pixel_mm
-    forward = (columns + 0.5) * view.pixel_mm
-    image: Image = np.zeros((len(rows), len(columns)), dtype=np.float32)
+    return (rows - 0.5 * (view.rows - 1)) * view.pixel_mm, (columns + 0.5) * view.pixel_mm
+
+
+def _zoomed_slices(
+    volume: Volume, view: ViewGeometry, along: NDArray[np.float64], forward: NDArray[np.float64]
+) -> Iterator[Image]:
+    """Each slice of constant height as the detector sees it."""
     heights = volume.origin[2] + volume.spacing[2] * np.arange(volume.shape[2])
     for level, zoom in enumerate(view.magnification(heights)):
         medial = (view.middle_mm + along / zoom - volume.origin[0]) / volume.spacing[0]
         posterior = (view.edge_p_mm - forward / zoom - volume.origin[1]) / volume.spacing[1]
-        image += interpolate_axis(interpolate_axis(volume.data[:, :, level], medial, 0), posterior, 1)
-    return np.asarray(image * float(volume.spacing[2]) * _obliquity(along, forward, view), dtype=np.float32)
+        yield interpolate_axis(interpolate_axis(volume.data[:, :, level], medial, 0), posterior, 1)
 
 
 def _obliquity(along: NDArray[np.float64], forward: NDArray[np.float64], view: ViewGeometry) -> NDArray[np.float64]:

@@ -9,10 +9,8 @@ from mammoreg.geometry import Volume
 from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import AffineDeformation, MeshDeformation, MethodView
 from mammoreg.materials.attenuation import attenuation_map
-from mammoreg.projection.cone_beam import Image, project_volume
+from mammoreg.projection.cone_beam import Image, project_shadow, project_volume
 from mammoreg.projection.deformed import MeshInverse, PlateGrid, grid_around, resample, undeformed_positions
-
-_LEAST_PATH_MM = 1.0
 
 
 @dataclass(frozen=True)
@@ -82,5 +80,4 @@ def project_breast(
 ) -> tuple[Image, NDArray[np.bool_]]:
     """Projected attenuation and silhouette of a deformed breast, at the middles of blocks of `step` pixels."""
     image = project_volume(breast.carry(tissue.attenuation), method.geometry, step)
-    path_mm = project_volume(breast.carry(tissue.mask), method.geometry, step)
-    return image, path_mm > _LEAST_PATH_MM
+    return image, project_shadow(breast.carry(tissue.mask), method.geometry, step)
