@@ -46,13 +46,13 @@ def _segment(path: Path, laterality):
 
 def _true_projection(view):
     """The compressed breast on a grid of its own, projected."""
-    axis = np.arange(-75.0, 76.0, 1.5)
+    axis = np.arange(-90.0, 90.1, 1.5)
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
     back = compression(view).inverse(points.reshape(-1, 3)).reshape(points.shape)
     breast = (np.abs(back[..., [0, 2]]) < HALF_WIDTH).all(-1) & (back[..., 1] < 0) & (back[..., 1] > -DEPTH)
     gland = np.linalg.norm(back - GLAND, axis=-1) < 9.0
     attenuation = np.where(breast, np.where(gland, 0.076727, 0.051255), 0.0).astype(np.float32)
-    return project_volume(Volume(attenuation, np.full(3, -75.0), np.full(3, 1.5)), geometry(view), STEP)
+    return project_volume(Volume(attenuation, np.full(3, -90.0), np.full(3, 1.5)), geometry(view), STEP)
 
 
 def _add_mammogram(path: Path, laterality, view):

@@ -26,9 +26,9 @@ def test_inverse_of_an_affine_compression_is_exact_inside_and_in_the_shell(mesh)
     inverse = MeshInverse(mesh.points, compress(mesh.points), mesh.hexes())
     inside = mesh.points[mesh.hexes()].mean(axis=1)
     assert inverse(compress(inside)) == pytest.approx(inside, abs=1e-3)
-    tip = compress(np.array([[0.0, -75.0, 0.0]])) + [0.0, -3.0, 0.0]
+    tip = compress(np.array([[0.0, -75.0, 0.0]])) + np.array([0.0, -3.0, 0.0])
     assert inverse(tip) == pytest.approx(expand(tip), abs=0.2)
-    assert np.isnan(inverse(tip + [0.0, -20.0, 0.0])).all()
+    assert np.isnan(inverse(tip + np.array([0.0, -20.0, 0.0]))).all()
 
 
 def test_grid_interpolation_of_the_inverse_is_good_to_a_tenth_of_a_millimetre(mesh):
