@@ -1,12 +1,11 @@
 """Stage `evaluate`: predictions against the truth that the tables name; it alone reads both sides."""
 
-from collections.abc import Sequence
 from typing import Any
 
 from pydantic import Field
 
 from mammoreg.localization.deformation import ReferenceMesh
-from stages.artefact import Artefact, Fields
+from stages.artefact import Fields
 from stages.contract import Inputs, SettingsModel, Stage, Subject
 from stages.evaluating.elongation import elongation_rows
 from stages.evaluating.fit import Limits, fit_rows
@@ -42,19 +41,12 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         "landmark_rows": _landmarks(inputs),
         "view_rows": [],
         "elongation_rows": [],
-        "failures": _failures(failed),
     }
     if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
         values |= _per_view(inputs, settings)
     if failed:
         return Fields(values=values, status=failed[0].status, message=failed[0].message)
     return Fields(values=values)
-
-
-def _failures(failed: Sequence[Artefact]) -> list[Row]:
-    """One row for each thing that went wrong: later stages repeat the message of the first."""
-    first = {(a.message, a.view): a for a in reversed(failed) if a.stage != "localize"}
-    return [{"stage": a.stage, "view": a.view or "", "status": a.status, "message": a.message} for a in first.values()]
 
 
 def _table_5(inputs: Inputs) -> list[Row]:

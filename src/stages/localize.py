@@ -91,7 +91,7 @@ def _joined(parts: Sequence[Fields], per_view: Sequence[Artefact]) -> Fields:
         volumes={name: volume for part in parts for name, volume in part.volumes.items()},
         values={name: value for part in parts for name, value in part.values.items()},
         status=failed.status if failed else "ok",
-        message=f"{failed.view}: {failed.message}" if failed else "",
+        message=failed.message if failed else "",
     )
 
 

@@ -1,10 +1,10 @@
 """A synthetic breast whose compression is affine, as the artefacts of the stages before `localize` hold it."""
 
-import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from mammoreg.geometry import ViewGeometry, Volume, lps_to_breast
 from mammoreg.geometry.frames import Laterality, plate_rotation
@@ -28,7 +28,7 @@ def box() -> BlockMesh:
 
 def geometry(view: str, parallel: bool = False) -> ViewGeometry:
     angle = {"CC": 3.0, "MLO": 48.0, "3D": 3.0}[view]
-    return ViewGeometry(angle, 5.0, 2.0, -40.0, 80.0, 650.0, 15.0, PIXEL_MM, ROWS, COLUMNS, parallel)
+    return ViewGeometry(angle, -5.0, 2.0, -40.0, 80.0, 650.0, 15.0, PIXEL_MM, ROWS, COLUMNS, parallel)
 
 
 def compression(view: str) -> AffineDeformation:
@@ -92,10 +92,7 @@ def write_pose(path: Path, laterality: Laterality, view: str, flip_rows: bool, f
     values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": []}
     values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}
     values |= {"flip_rows": flip_rows, "flip_columns": flip_columns}
-    corners = np.array([[0, -1], [-1, -1], [-1, 1], [0, 1]]) * np.array([DEPTH, HALF_WIDTH])
-    edges = [np.linspace(a, b, 60) for a, b in itertools.pairwise(corners)]
-    skin = np.concatenate(edges)
-    outline = g.project(np.stack([skin[:, 1] * SHRINK**-0.5, skin[:, 0] * SHRINK**-0.5, 0 * skin[:, 0]], axis=1))
+    outline = _outline(view)
     arrays = {
         "outline": Array(outline, "px", "outline"),
         "outline_weight": Array(np.ones(len(outline)), "1", "trust in the outline"),
@@ -105,6 +102,14 @@ def write_pose(path: Path, laterality: Laterality, view: str, flip_rows: bool, f
         arrays[f"{name}_offset"] = Array(affine.offset, "mm", name)
     write_artefact(path, header("pose", laterality, view), Fields(arrays=arrays, values=values))
     return path
+
+
+def _outline(view: str) -> np.ndarray:
+    """Outline of the projected box, a convex polygon, from the chest wall round the front and back to it."""
+    corners = geometry(view, parallel=view == "3D").project(compression(view).forward(box().points))
+    polygon = corners[ConvexHull(corners).vertices]
+    gaps = np.where(polygon[:, 0] < 0, polygon[:, 0] + np.roll(polygon[:, 0], -1), np.inf)
+    return np.roll(polygon, -1 - int(np.argmin(gaps)), axis=0)
 
 
 def write_solution(path: Path, laterality: Laterality, stage: str, view: str) -> Path:

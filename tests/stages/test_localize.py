@@ -38,7 +38,7 @@ def view_marks(folder: Path, views: tuple[str, ...], flips: tuple[bool, bool]) -
         f"lesion_{view}": write_tsv(
             folder / f"lesion_{view}.tsv",
             "name column row diameter_mm",
-            {"mass": [*synthetic.stored(synthetic.true_pixel(view, LESION), flips), 10.0]},
+            {"mass": [*synthetic.stored(synthetic.true_pixel(view, LESION), flips), 10.0 * synthetic.SHRINK**-0.5]},
         )
         for view in views
     }

@@ -12,7 +12,7 @@ from mammoreg.localization.lesions import LesionArea, MaskLesion, SphereLesion, 
 from mammoreg.metrics.distances import detector_distance_mm, distance_to_curve_mm
 from mammoreg.metrics.elongation import extents_mm
 from mammoreg.metrics.overlap import overlap_of_areas, overlap_of_sizes, overlap_of_volumes
-from mammoreg.metrics.paper import METHODS, TABLE_5, TABLE_6, PaperRow, paper_overlap_percent, paper_summary
+from mammoreg.metrics.paper import METHODS, TABLE_5, TABLE_6, VOLUNTEER, PaperRow, paper_overlap_percent, paper_summary
 from mammoreg.metrics.summary import summarise
 from tests.shared_data import DATA, requires_shared
 
@@ -141,6 +141,14 @@ def test_paper_tables_equal_the_reference(table: str, rows: tuple[PaperRow, ...]
         assert [row["view"] == "CC" for row in printed] == [row.view == "CC" for row in rows]
     else:
         assert [row["estimate_from_one_view"] for row in printed] == [row.view == "CC" for row in rows]
+
+
+@requires_shared("reference")
+def test_volunteer_equals_the_reference() -> None:
+    reference = json.loads(REFERENCE.read_text())["table_3"]
+    for column, method in ((0, "plate"), (2, "updated")):
+        printed = tuple(reference[name][column] for name in ("mean", "sd", "max"))
+        assert printed == (VOLUNTEER[method].mean_mm, VOLUNTEER[method].sd_mm, VOLUNTEER[method].max_mm)
 
 
 def test_the_papers_improvements_and_share() -> None:

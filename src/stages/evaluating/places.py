@@ -56,7 +56,7 @@ def landmark_rows_in_mammogram(
 def lesion_rows_in_mr(
     predictions: Predictions, lesions: Mapping[str, MrLesion], views_of: Mapping[str, list[str]]
 ) -> list[Row]:
-    """Table VI.
+    """Table VI; a lesion that a method could not predict from all views that mark it has a row with empty numbers.
 
     Args:
         lesions: true lesions by name, LPS.
@@ -65,19 +65,27 @@ def lesion_rows_in_mr(
     rows = []
     for method in METHODS:
         for name, views in views_of.items():
-            row: Row = {"views": "+".join(views), "method": method, "name": name, "distance_mm": None}
-            row |= _NO_OVERLAP | {"distance_to_curve_mm": None}
             found = predictions.in_mr(method, name)
+            if found is None or found["views"] != "+".join(views):
+                rows.append(_mr_row("+".join(views), method, name))
             if found is not None:
-                true = lesions[name].centre
-                row["views"] = found["views"]
-                row["distance_mm"] = float(np.linalg.norm(_point(found) - true))
-                row |= _overlap(overlap_of_volumes(predictions.region(method, name), lesions[name]))
-                if "+" not in found["views"]:
-                    curve = predictions.curve(method, name, found["views"])
-                    row["distance_to_curve_mm"] = distance_to_curve_mm(true, curve)
-            rows.append(row)
+                rows.append(_mr_row(found["views"], method, name) | _mr_numbers(predictions, found, lesions[name]))
     return rows
+
+
+def _mr_row(views: str, method: str, name: str) -> Row:
+    empty = {"distance_mm": None, **_NO_OVERLAP, "distance_to_curve_mm": None}
+    return {"views": views, "method": method, "name": name, **empty}
+
+
+def _mr_numbers(predictions: Predictions, found: Row, lesion: MrLesion) -> Row:
+    """Distance and overlap of a lesion; the distance to the curve where one view alone was used."""
+    method, name, views = found["method"], found["name"], found["views"]
+    numbers: Row = {"distance_mm": float(np.linalg.norm(_point(found) - lesion.centre))}
+    numbers |= _overlap(overlap_of_volumes(predictions.region(method, name), lesion))
+    if "+" not in views:
+        numbers["distance_to_curve_mm"] = distance_to_curve_mm(lesion.centre, predictions.curve(method, name, views))
+    return numbers
 
 
 def landmark_rows_in_compressed(

@@ -1,0 +1,152 @@
+"""Stage `evaluate`: what it measures where the predictions' error is known."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mammoreg.geometry import lps_to_breast, plate_to_breast
+from stages.artefact import Artefact
+from stages.contract import Subject
+from stages.run import run_stage
+from tests.stages import synthetic_case as synthetic
+from tests.stages.test_localize import LESION, POINTS, localized, mr_marks, view_marks, write_tsv
+
+OFFSET_PX = np.array([12.0, 16.0])  # 20 pixels of 0.25 mm: 5 mm at the detector
+
+
+def evaluated(folder: Path, inputs: dict[str, Any], settings: dict[str, Any] | None = None) -> Artefact:
+    known = {name: paths for name, paths in inputs.items() if name in ("segment", "mesh", "pose", "compress", "solve")}
+    localize_marks = {n: p for n, p in inputs.items() if n.startswith(("mr_l", "lesion"))}
+    localized(known | localize_marks, folder / "localize.h5")
+    everything = inputs | {"localize": folder / "localize.h5"}
+    run_stage("evaluate", everything, folder / "evaluate.h5", settings or {}, Subject("case1"))
+    return Artefact(folder / "evaluate.h5")
+
+
+def landmark_truth(folder: Path) -> dict[str, Path]:
+    named = {name: point for name, point in POINTS.items() if name != "deep"}
+    found = {}
+    for view in ("CC", "MLO"):
+        pixels = {name: synthetic.true_pixel(view, point) + OFFSET_PX for name, point in named.items()}
+        pixels |= {"only_here": np.array([100.0, 100.0]), "deep": np.array([3.0, 300.0])}
+        found[f"landmarks_{view}"] = write_tsv(folder / f"landmarks_{view}.tsv", "name column row", pixels)
+    carried = {
+        name: plate_to_breast(synthetic.compression("CC").forward(point[None])[0], 3.0)
+        + synthetic.SECOND_VOLUME_SHIFT
+        + np.array([0.0, 2.0, 0.0])
+        for name, point in named.items()
+    }
+    found["mr_compressed_landmarks"] = write_tsv(folder / "compressed.tsv", "name x y z", carried)
+    return found
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Artefact:
+    folder = tmp_path_factory.mktemp("evaluate")
+    inputs = synthetic.write_case(folder, compressed=True)
+    marks = mr_marks(folder, "R") | view_marks(folder, ("CC", "MLO"), (False, False)) | landmark_truth(folder)
+    return evaluated(folder, inputs | marks)
+
+
+def rows_of(artefact: Artefact, name: str, method: str) -> list[dict[str, Any]]:
+    return [row for row in artefact.value(name) if row["method"] == method]
+
+
+def test_perfect_predictions_of_the_lesion(result: Artefact) -> None:
+    for row in rows_of(result, "table_5_rows", "updated"):
+        assert row["distance_mm"] < 0.2
+        assert row["overlap_percent"] > 90.0
+    (row,) = rows_of(result, "table_6_rows", "updated")
+    assert row["views"] == "CC+MLO"
+    assert row["distance_mm"] < 0.6
+    assert row["overlap_percent"] > 90.0
+    assert row["distance_to_curve_mm"] is None
+
+
+def test_known_offset_of_landmarks_and_what_counts(result: Artefact) -> None:
+    expected = 20 * synthetic.PIXEL_MM / synthetic.geometry("CC").middle_magnification
+    for view in ("CC", "MLO"):
+        rows = {
+            r["landmark"]: r["distance_mm"] for r in rows_of(result, "landmark_rows", "updated") if r["view"] == view
+        }
+        assert set(rows) == {"p1", "p2", "deep"}
+        assert rows["deep"] is None
+        assert rows["p1"] == pytest.approx(expected, rel=1e-6)
+
+
+def test_landmarks_in_the_second_volume(result: Artefact) -> None:
+    rows = [row for row in rows_of(result, "landmark_rows", "plate") if row["view"] == "3D"]
+    assert {row["landmark"] for row in rows} == {"p1", "p2"}
+    assert all(row["distance_mm"] == pytest.approx(2.0, abs=0.7) for row in rows)
+    before = {m: [r["distance_mm"] for r in rows_of(result, "landmark_rows", m)] for m in ("before", "translation")}
+    assert np.mean(before["translation"]) < np.mean(before["before"])
+
+
+def test_fit_of_a_view_that_meets_its_outline(result: Artefact) -> None:
+    row = next(row for row in rows_of(result, "view_rows", "updated") if row["view"] == "CC")
+    assert row["outline_mean_mm"] < 0.3
+    assert row["outline_dice"] > 0.99
+    assert (row["force_n"], row["angle_deg"], row["middle_mm"], row["trust"]) == (80.0, 3.0, 2.0, "")
+
+
+def test_a_left_breast_counts_the_middle_the_other_way(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, "L", views=("CC",))
+    assert evaluated(tmp_path, inputs).value("view_rows")[0]["middle_mm"] == -2.0
+
+
+def test_what_speaks_against_a_view(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    found = evaluated(tmp_path, inputs, {"min_det_f_limit": 0.95, "outline_p95_limit_mm": 2.0})
+    trust = rows_of(found, "view_rows", "plate")[0]["trust"]
+    assert trust == "low Jacobian 0.90"
+    assert "outline misfit" in rows_of(found, "view_rows", "rigid")[0]["trust"]
+
+
+def test_elongation_is_the_closed_form(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("3D",), compressed=True)
+    stretch = synthetic.SHRINK**-0.5 - 1.0
+    rows = {r["direction"]: r for r in rows_of(evaluated(tmp_path, inputs), "elongation_rows", "updated")}
+    width = 2 * synthetic.HALF_WIDTH * (np.cos(np.radians(3)) + np.sin(np.radians(3)))
+    for direction, expected in {"antero_posterior": stretch * synthetic.DEPTH, "lateral": stretch * width}.items():
+        assert rows[direction]["elongation_mm"] == pytest.approx(expected, abs=0.5)
+        assert rows[direction]["true_mm"] == pytest.approx(expected, abs=0.5)
+
+
+def test_a_failed_case_counts_with_empty_distances(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    inputs["segment"] = [synthetic.write_failed(tmp_path / "bad.h5", "R", "segment", message="volume is NaN")]
+    marks = mr_marks(tmp_path, "R") | view_marks(tmp_path, ("CC", "MLO"), (False, False)) | landmark_truth(tmp_path)
+    found = evaluated(tmp_path, inputs | marks)
+    assert (found.status, found.message) == ("failed", "segment: volume is NaN")
+    assert [row["distance_mm"] for row in rows_of(found, "table_5_rows", "updated")] == [None, None]
+    assert [row["views"] for row in rows_of(found, "table_6_rows", "updated")] == ["CC+MLO"]
+    assert all(row["distance_mm"] is None for row in rows_of(found, "landmark_rows", "updated"))
+    assert found.value("view_rows") == []
+
+
+def test_one_view_measures_the_distance_to_its_curve(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    found = evaluated(tmp_path, inputs | mr_marks(tmp_path, "R") | view_marks(tmp_path, ("CC",), (False, False)))
+    (row,) = rows_of(found, "table_6_rows", "updated")
+    assert row["views"] == "CC"
+    assert row["distance_to_curve_mm"] < 0.6
+    assert row["distance_mm"] == pytest.approx(abs(LESION[2]), abs=3.0)
+
+
+def test_a_lost_view_leaves_an_empty_two_view_row(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    for stage in ("compress", "solve"):
+        inputs[stage][1] = synthetic.write_failed(tmp_path / f"{stage}_bad.h5", "R", stage, "MLO")
+    found = evaluated(tmp_path, inputs | mr_marks(tmp_path, "R") | view_marks(tmp_path, ("CC", "MLO"), (False, False)))
+    rows = {row["views"]: row["distance_mm"] for row in rows_of(found, "table_6_rows", "plate")}
+    assert rows["CC+MLO"] is None
+    assert rows["CC"] is not None
+
+
+def test_names_must_agree_to_be_compared(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    other = write_tsv(tmp_path / "o.tsv", "name x y z diameter_mm", {"other": [*lps_to_breast(LESION, "R"), 8.0]})
+    found = evaluated(tmp_path, inputs | view_marks(tmp_path, ("CC", "MLO"), (False, False)) | {"mr_lesion": other})
+    assert found.value("table_5_rows") == found.value("table_6_rows") == []
