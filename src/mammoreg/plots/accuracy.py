@@ -26,7 +26,7 @@ def error_panels(panels: Sequence[ErrorPanel]) -> Png:
     with new_figure(3.6 * len(panels), 3.4) as figure:
         for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
             _draw_errors(axes, panel)
-        figure.suptitle(NOTICE, fontsize=8, color="#444444", x=0.01, ha="left")
+        figure.suptitle(NOTICE, fontsize=8, color="#444444")
         return to_png(figure)
 
 
@@ -86,5 +86,5 @@ def error_against_runtime(points: Sequence[RuntimePoint]) -> Png:
         axes.set_ylabel("mean distance to the truth (mm)")
         axes.legend(ncols=2)
         axes.set_title("Error against computing time; numbers: elements a side", loc="left")
-        figure.suptitle(NOTICE, fontsize=8, color="#444444", x=0.01, ha="left")
+        figure.suptitle(NOTICE, fontsize=8, color="#444444")
         return to_png(figure)

@@ -23,6 +23,7 @@ from mammoreg.plots.style import (
 
 Points = NDArray[np.float64]
 _OUTLINE_COLOUR = "#d0d0d0"
+_AROUND_MM = 35.0
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ def landmarks_in_volume(mask: Volume, true: Points, predicted: Mapping[str, Poin
                 _draw_silhouette(axes, mask, horizontal, vertical)
                 pair = [horizontal, vertical]
                 draw_displacements(axes, true[:, pair], points[:, pair], TRUE_COLOUR, method_colour(method))
+                _limit_to(axes, true[:, pair])
                 axes.set_title(f"{method}, {title}")
                 axes.set_xlabel(f"{'xyz'[horizontal]} LPS (mm)")
                 axes.set_ylabel(f"{'xyz'[vertical]} LPS (mm)")
@@ -82,7 +84,14 @@ def _draw_silhouette(axes: Any, mask: Volume, horizontal: int, vertical: int) ->
     axes.set_aspect("equal")
 
 
+def _limit_to(axes: Any, points: Points) -> None:
+    """Show what lies around the points, not the chest behind the breast."""
+    low, high = points.min(axis=0) - _AROUND_MM, points.max(axis=0) + _AROUND_MM
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+
+
 def _finish(figure: Any, laterality: str, what: str) -> None:
     keys = [line_key(TRUE_COLOUR, "circle: true place"), line_key("#555555", "cross: predicted place")]
-    figure.legend(handles=keys, loc="outside lower left", ncols=2)
+    figure.legend(handles=keys, loc="outside lower center", ncols=2)
     add_notice(figure, side_name(laterality), what)

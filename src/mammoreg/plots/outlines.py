@@ -49,7 +49,7 @@ def outlines_before_and_after(views: Sequence[ViewOutlines], laterality: str) ->
                 shown += [name for name in names if name not in shown]
         keys = [line_key(TRUE_COLOUR, "outline in the image (faint: not skin, not used)")]
         keys += [line_key(method_colour(name), name) for name in shown]
-        figure.legend(handles=keys, loc="outside lower left", ncols=len(keys))
+        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys))
         add_notice(figure, side_name(laterality), "Outlines of image and model")
         return to_png(figure)
 

@@ -57,7 +57,7 @@ def lesion_overview(views: Sequence[ViewLesions], mr: VolumeLesions, laterality:
             overlays += [SliceOverlay(mask, PREDICTED_COLOUR) for mask in mr.predicted]
             show_slice(axes, mr.volume, plane, mr.through, overlays, f"{laterality} MR, {plane}")
         keys = [line_key(TRUE_COLOUR, "lesion as marked"), line_key(PREDICTED_COLOUR, f"predicted ({method})")]
-        figure.legend(handles=keys, loc="outside lower left", ncols=2)
+        figure.legend(handles=keys, loc="outside lower center", ncols=2)
         add_notice(figure, side_name(laterality), "Lesion localisation")
         return to_png(figure)
 

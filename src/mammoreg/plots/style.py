@@ -64,7 +64,7 @@ def to_png(figure: Figure, dpi: int = 130) -> Png:
 
 def add_notice(figure: Figure, side: str, what: str) -> None:
     """Head line with case content and side, and the notice that no picture goes without."""
-    figure.suptitle(f"{what}  ·  {side}  ·  {NOTICE}", fontsize=9, color="#444444", x=0.01, ha="left")
+    figure.suptitle(f"{what}  ·  {side}  ·  {NOTICE}", fontsize=9, color="#444444")
 
 
 def side_name(laterality: str) -> str:

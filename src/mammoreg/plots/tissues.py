@@ -36,6 +36,6 @@ def segmentation(
             show_slice(axes, volume, plane, nipple, overlays, f"{laterality} MR, {plane}")
             across, up = {"axial": (0, 1), "sagittal": (1, 2)}[plane]
             axes.plot(nipple[across], nipple[up], "+", color="#ff2d95", ms=9, mew=1.6)
-        figure.legend(handles=keys, loc="outside lower left", ncols=len(keys))
+        figure.legend(handles=keys, loc="outside lower center", ncols=len(keys))
         add_notice(figure, side_name(laterality), "Segmentation, slices through the nipple (+)")
         return to_png(figure)

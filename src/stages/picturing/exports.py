@@ -1,0 +1,227 @@
+"""Files of a case that other programs open (3D Slicer, ParaView), by name inside its folder `export`."""
+
+import gzip
+import io
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mammoreg.geometry import Volume, lps_to_breast, plate_to_breast
+from mammoreg.geometry.frames import Laterality, Points, plate_rotation
+from mammoreg.meshing.block import BlockMesh
+from stages.artefact import Artefact
+from stages.marks import canonical_pixels
+from stages.methods import MESH_METHODS
+from stages.picturing.case import PicturedCase
+
+_LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
+_DISPLACEMENT_INTENT = 1006
+_COMPRESSION_LEVEL = 1
+_OUTSIDE_MM = 0.0
+README = """Research use only.
+
+Coordinates inside the files follow each format's habit (NIfTI: RAS; VTU: LPS), all in mm.
+
+lesion_<n>_<method>_mr.nii.gz      lesion predicted from the mammograms, on the grid of the segmented MR volume
+lesion_<n>_<method>_<view>.png     lesion predicted from the MR volume, in the mammogram's pixels as stored
+mr_<view>_<method>.nii.gz          MR volume as deformed between the plates of a view
+displacement_<view>_<method>.nii.gz  displacement of each voxel of the undeformed breast, zero outside it
+mesh.vtu, mesh_<view>_<method>.vtu undeformed and deformed mesh
+lesions.tsv                        names of the lesions <n>, as marked in the MR volume (mr) and in the mammograms
+"""
+
+
+def case_exports(case: PicturedCase) -> dict[str, bytes]:
+    """All files of a case as far as its stages came.
+
+    Returns:
+        Contents by file name; empty where not even the mesh exists.
+    """
+    mesh, block = case.ok("mesh"), case.block
+    if mesh is None or block is None:
+        return {}
+    files = {"README.txt": README.encode(), "mesh.vtu": _undeformed_mesh(mesh, block)}
+    files |= _lesion_names(case) | _lesions_in_mr(case) | _lesions_in_mammograms(case)
+    for view in case.poses:
+        offered = [method for method in MESH_METHODS if method in case.methods[view]]
+        files |= {f"mesh_{view}_{m}.vtu": _deformed_mesh(case, block, view, m) for m in offered}
+        files |= _deformation(case, view, offered[-1]) if offered else {}
+    return files
+
+
+def nifti_bytes(data: NDArray[Any], affine_lps: NDArray[np.float64], intent: int = 0) -> bytes:
+    """A compressed NIfTI file without a clock in it.
+
+    Args:
+        data: samples, (nx, ny, nz) or (nx, ny, nz, 1, 3).
+        affine_lps: voxel index to LPS mm, (4, 4).
+        intent: NIfTI intent code.
+    """
+    import nibabel as nib
+
+    image = nib.Nifti1Image(data, _LPS_TO_RAS @ affine_lps)
+    image.header.set_xyzt_units("mm")
+    image.header.set_intent(intent)
+    packed = io.BytesIO()
+    with gzip.GzipFile(fileobj=packed, mode="wb", compresslevel=_COMPRESSION_LEVEL, mtime=0, filename="") as file:
+        file.write(image.to_bytes())
+    return packed.getvalue()
+
+
+def volume_affine(volume: Volume) -> NDArray[np.float64]:
+    """Voxel index to mm in the volume's own frame, (4, 4)."""
+    affine = np.diag([*volume.spacing, 1.0])
+    affine[:3, 3] = volume.origin
+    return affine
+
+
+def plate_to_lps_affine(angle_deg: float, laterality: Laterality) -> NDArray[np.float64]:
+    """The plate frame to LPS, (4, 4)."""
+    affine = np.eye(4)
+    affine[:3, :3] = plate_rotation(angle_deg).T
+    if laterality == "L":
+        affine[0] *= -1.0
+    return affine
+
+
+def _deformation(case: PicturedCase, view: str, method: str) -> dict[str, bytes]:
+    """Deformed MR volume and displacement field of one method."""
+    name = f"{view}_{method}"
+    angle = case.methods[view][method].geometry.angle_deg
+    files = {}
+    projected = case.projection(view)
+    if projected is not None and f"{method}/mr" in projected.volume_names():
+        volume = projected.volume(f"{method}/mr", frame="plate")
+        affine = plate_to_lps_affine(angle, case.laterality) @ volume_affine(volume)
+        files[f"mr_{name}.nii.gz"] = nifti_bytes(volume.data.astype(np.float32), affine)
+    segment = case.ok("segment")
+    if segment is not None:
+        grid = segment.volume("breast_mask")
+        field = displacement_field(case, view, method, grid)
+        # NIfTI keeps the three components in its fifth axis, in its own RAS directions.
+        ras = (field * [-1.0, -1.0, 1.0]).astype(np.float32)[:, :, :, None]
+        files[f"displacement_{name}.nii.gz"] = nifti_bytes(ras, volume_affine(grid), _DISPLACEMENT_INTENT)
+    return files
+
+
+def displacement_field(case: PicturedCase, view: str, method: str, breast: Volume) -> NDArray[np.float64]:
+    """Displacement of the breast's voxels in LPS, (nx, ny, nz, 3), mm; zero outside the breast."""
+    mask = breast.data != 0
+    points = breast.centres(mask)
+    field = np.full((*breast.shape, 3), _OUTSIDE_MM)
+    field[mask] = _carried(case, view, method, points) - points
+    return field
+
+
+def _carried(case: PicturedCase, view: str, method: str, points: Points) -> Points:
+    """Points (N, 3) of the undeformed breast between the plates of a view, both LPS mm."""
+    way = case.methods[view][method]
+    placed = way.deformation.forward(lps_to_breast(points, case.laterality))
+    return lps_to_breast(plate_to_breast(placed, way.geometry.angle_deg), case.laterality)
+
+
+def _undeformed_mesh(mesh: Artefact, block: BlockMesh) -> bytes:
+    """The undeformed mesh, LPS, with the share of gland in each element where the mesh knows it."""
+    shares = {"gland_fraction": [mesh.array("gland_fraction", "1")]} if mesh.has("gland_fraction") else {}
+    return vtu_bytes(lps_to_breast(block.points, mesh.laterality), lps_hexes(block, mesh.laterality), {}, shares)
+
+
+def _deformed_mesh(case: PicturedCase, block: BlockMesh, view: str, method: str) -> bytes:
+    """The deformed mesh, LPS, with the displacement of its nodes."""
+    points = lps_to_breast(block.points, case.laterality)
+    carried = _carried(case, view, method, points)
+    return vtu_bytes(carried, lps_hexes(block, case.laterality), {"displacement_mm": carried - points}, {})
+
+
+def lps_hexes(block: BlockMesh, laterality: Laterality) -> NDArray[np.int64]:
+    """Connectivity (n^3, 8) whose Jacobians are positive in LPS, where a left breast is mirrored."""
+    hexes = block.hexes()
+    return hexes if laterality == "R" else hexes[:, [1, 0, 3, 2, 5, 4, 7, 6]]
+
+
+def vtu_bytes(
+    points: Points, hexes: NDArray[Any], point_data: Mapping[str, Any], cell_data: Mapping[str, Any]
+) -> bytes:
+    """A hexahedral mesh as VTU, which ParaView and 3D Slicer open."""
+    import meshio
+
+    mesh = meshio.Mesh(points, [("hexahedron", hexes)], point_data=dict(point_data), cell_data=dict(cell_data))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mesh.vtu"
+        mesh.write(path)
+        return path.read_bytes()
+
+
+def _lesion_names(case: PicturedCase) -> dict[str, bytes]:
+    """Which lesion each number stands for."""
+    marked = {"mr": case.mr_lesions, "mammograms": case.mammogram_lesions}
+    lines = [f"{where}\t{number}\t{name}" for where, names in marked.items() for number, name in enumerate(names)]
+    return {"lesions.tsv": "\n".join(["marked_in\tn\tname", *lines, ""]).encode()} if lines else {}
+
+
+def _lesions_in_mr(case: PicturedCase) -> dict[str, bytes]:
+    """Regions in the MR volume, on the grid of the segmented volume."""
+    segment, predictions = case.ok("segment"), case.predictions
+    if segment is None or predictions is None:
+        return {}
+    grid, files = segment.volume("breast_mask"), {}
+    for number, name in enumerate(case.mammogram_lesions):
+        for method in sorted({method for view in case.imaged for method in case.methods[view]}):
+            region = predictions.region(method, name)
+            if region is not None:
+                mask = on_grid(region, grid)
+                files[f"lesion_{number}_{method}_mr.nii.gz"] = nifti_bytes(mask, volume_affine(grid))
+    return files
+
+
+def on_grid(mask: Volume, grid: Volume) -> NDArray[np.uint8]:
+    """A mask at the voxel centres of another grid of the same frame."""
+    sampled = np.zeros(grid.shape, dtype=np.uint8)
+    low = np.maximum(np.floor(grid.to_index(mask.origin - mask.spacing)).astype(int), 0)
+    far = mask.origin + mask.spacing * np.array(mask.shape)
+    high = np.minimum(np.ceil(grid.to_index(far)).astype(int) + 1, grid.shape)
+    if (high <= low).any():
+        return sampled
+    part = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
+    inside = np.zeros(grid.shape, dtype=bool)
+    inside[part] = True
+    sampled[inside] = mask.sample(grid.centres(inside), order=0) > 0.5
+    return sampled
+
+
+def _lesions_in_mammograms(case: PicturedCase) -> dict[str, bytes]:
+    """Predicted lesions as pictures of the stored mammogram's size."""
+    files: dict[str, bytes] = {}
+    predictions = case.predictions
+    if predictions is None:
+        return files
+    for view, pose in case.imaged.items():
+        for method in sorted(case.methods[view]):
+            for number, name in enumerate(case.mr_lesions):
+                area = predictions.area(view, method, name)
+                if area is not None:
+                    canonical = area.on_image(int(pose.value("rows")), int(pose.value("columns")))
+                    files[f"lesion_{number}_{method}_{view}.png"] = mask_png(stored_image(pose, canonical))
+    return files
+
+
+def stored_image(pose: Artefact, canonical: NDArray[Any]) -> NDArray[Any]:
+    """A canonical mask turned into the stored one; each stored pixel takes the canonical one under its centre."""
+    columns, rows = np.arange(int(pose.value("stored_columns"))), np.arange(int(pose.value("stored_rows")))
+    from_columns = canonical_pixels(pose, np.stack([columns, np.zeros_like(columns)], axis=1))[:, 0]
+    from_rows = canonical_pixels(pose, np.stack([np.zeros_like(rows), rows], axis=1))[:, 1]
+    index = (np.rint(from_rows).astype(np.intp), np.rint(from_columns).astype(np.intp))
+    return np.asarray(canonical[np.ix_(*(np.clip(i, 0, n - 1) for i, n in zip(index, canonical.shape, strict=True)))])
+
+
+def mask_png(mask: NDArray[Any]) -> bytes:
+    """A mask as a grey PNG: 255 inside, 0 outside."""
+    from PIL import Image
+
+    packed = io.BytesIO()
+    Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(packed, format="PNG")
+    return packed.getvalue()
