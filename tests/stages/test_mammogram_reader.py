@@ -106,6 +106,8 @@ def test_padding_counts_as_air(tmp_path):
     [
         ({"ImageLaterality": "L"}, "ImageLaterality is L, the table's laterality is R"),
         ({"ViewPosition": "MLO"}, "ViewPosition is MLO, the table's view is CC"),
+        ({"PatientOrientation": ["L", "P"]}, "antero-posterior"),
+        ({"PatientOrientation": ["P", "F"]}, "does not tell the row order"),
         ({"Modality": "MR"}, "modality is MR, not MG"),
         ({"ImagerPixelSpacing": [0.0, 0.0]}, "not positive"),
         ({"ImagerPixelSpacing": [0.1, 0.2]}, "not square"),

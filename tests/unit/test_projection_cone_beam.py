@@ -4,12 +4,13 @@ import csv
 import json
 from dataclasses import replace
 
+import h5py
 import nibabel
 import numpy as np
 import pydicom
 import pytest
 
-from mammoreg.geometry import ViewGeometry, Volume
+from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate
 from mammoreg.materials.attenuation import ATTENUATION_20KEV_PER_MM, attenuation_map
 from mammoreg.metrics.correlation import correlation
 from mammoreg.projection.comparison import block_mean, projection_correlation
@@ -139,3 +140,23 @@ def test_victre_labels_between_the_plates_give_its_mammogram():
     assert (image - measured)[both].mean() == pytest.approx(0.0, abs=0.05)
     first, second = image > 0.15, measured > 0.15
     assert 2 * (first & second).sum() / (first.sum() + second.sum()) > 0.99
+
+
+@requires_shared("twins")
+@pytest.mark.parametrize(("case", "view"), [("twin1", "CC"), ("twin1", "MLO"), ("twin4", "CC"), ("twin4", "MLO")])
+def test_points_of_the_twins_appear_where_their_maker_put_them(case, view):
+    header = pydicom.dcmread(DATA / f"twins/mg/{case}_{view}.dcm", stop_before_pixels=True)
+    with h5py.File(DATA / f"twins/truth/{case}.h5") as file:
+        group, true = file[view], dict(file[view].attrs)
+        between, pixels = group["points_between_plates_lps"][:], group["points_column_row"][:]
+    pixels = pixels * [-1.0, 1.0] + [header.Columns - 1.0, 0.0]  # stored "P, L": columns run from the nipple
+    plate = breast_to_plate(between - true["centre"], true["true_roll_deg"])
+    geometry = ViewGeometry(
+        angle_deg=true["true_roll_deg"], edge_p_mm=true["edge_y"], middle_mm=0.0, height_mm=true["plate_lower"],
+        thickness_mm=true["gap_mm"], source_detector_mm=650.0, support_detector_mm=15.0, pixel_mm=0.2,
+        rows=header.Rows, columns=header.Columns,
+    )  # fmt: skip
+    zoom = geometry.magnification(plate[:, 2])
+    middle = np.mean(((geometry.project(plate) - pixels)[:, 1]) * 0.2 / zoom)  # not written down by the maker
+    found = replace(geometry, middle_mm=float(middle)).project(plate)
+    assert found == pytest.approx(pixels, abs=0.02)

@@ -14,7 +14,8 @@ from pydicom.errors import InvalidDicomError
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-from stages.readers.mammogram_header import MammogramFacts, View, mammogram_facts
+from mammoreg.imaging.mammogram_orientation import View
+from stages.readers.mammogram_header import MammogramFacts, mammogram_facts
 
 PICTURES = (".png", ".tif", ".tiff")
 

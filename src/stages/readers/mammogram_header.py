@@ -3,14 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 from pydicom.dataset import Dataset
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-
-View = Literal["CC", "MLO"]
+from mammoreg.imaging.mammogram_orientation import View, flips_of_orientation
 
 DEFAULT_SOURCE_DETECTOR_MM = 650.0
 DEFAULT_SUPPORT_DETECTOR_MM = 15.0
@@ -104,7 +102,7 @@ def mammogram_facts(
         row: the row of views.tsv; empty cells may be left out.
 
     Raises:
-        DataError: If header and table contradict each other in side or view, or a value is impossible.
+        DataError: If header and table contradict each other in side, view or orientation, or a value is impossible.
     """
     source = _Source(path, header, row)
     _check_side_and_view(source, laterality, view)
@@ -123,6 +121,8 @@ def mammogram_facts(
         "support_detector_mm": _support_height(source),
     }
     orientation = row.get("orientation", "").strip() or _orientation(source)
+    if orientation:
+        _check_orientation(source, orientation, laterality, view)
     texts = {"orientation": orientation, "polarity": source.text("PhotometricInterpretation")}
     estimated = tuple(name for name, value in {**known, **texts}.items() if value is None)
     intent = source.text("PresentationIntentType")
@@ -159,6 +159,13 @@ def _check_side_and_view(source: _Source, laterality: Laterality, view: View) ->
             f"the header's ViewPosition is {position}, the table's view is {view}",
             "correct views.tsv or name the image of the other view",
         )
+
+
+def _check_orientation(source: _Source, orientation: str, laterality: Laterality, view: View) -> None:
+    try:
+        flips_of_orientation(orientation, laterality, view)
+    except DataError as error:
+        raise DataError(f"{source.path}: {error}") from error
 
 
 def _orientation(source: _Source) -> str | None:
