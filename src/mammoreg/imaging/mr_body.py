@@ -1,0 +1,73 @@
+"""The patient's body against air in an MR volume of the breast frame."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.filters import threshold_otsu
+
+from mammoreg.errors import DataError
+from mammoreg.geometry import Volume
+
+Mask = NDArray[np.bool_]
+
+
+def air_threshold(samples: NDArray[np.float32]) -> tuple[float, float]:
+    """Level between air and tissue, and the mean level of air.
+
+    Otsu's threshold of the logarithms: coil inhomogeneity and fat suppression spread tissue over a decade.
+
+    Raises:
+        DataError: the samples hold one level only.
+    """
+    scale = float(np.percentile(samples, 99.0))
+    if not np.isfinite(scale) or scale <= float(samples.min()):
+        raise DataError("the MR volume is constant or almost empty: hand in the volume of intensities")
+    logs = np.log(np.clip(samples, 0.04 * scale, None))
+    threshold = float(np.exp(threshold_otsu(logs)))
+    return threshold, float(samples[samples < threshold].mean())
+
+
+def outside_air(dark: Mask) -> Mask:
+    """Dark voxels reached from the anterior face of the grid (posterior index 0): air, and neither lung nor vessel.
+
+    Passages narrower than six voxels are closed, so that noise in the chest wall does not open the lungs.
+    """
+    padded = np.pad(dark, ((3, 3), (3, 0), (3, 3)), mode="edge")
+    wide = ndimage.binary_erosion(padded, iterations=3, border_value=1)
+    label, _ = ndimage.label(wide)
+    front = np.unique(label[:, 0])
+    reached = np.isin(label, front[front > 0])
+    air = ndimage.binary_dilation(reached, iterations=4, mask=padded)
+    return np.asarray(air[3:-3, 3:, 3:-3], dtype=np.bool_)
+
+
+def body_mask(volume: Volume) -> Mask:
+    """Body against air, to about half a voxel: skin closed, lungs and other dark holes filled.
+
+    A global threshold finds the body; then the level half-way between air and the tissue nearby (within some 4 mm) sets
+    its border, so that bright and dark skin are cut at the same place.
+
+    Raises:
+        DataError: no body in the volume.
+    """
+    smooth = ndimage.gaussian_filter(volume.data, 0.5, truncate=3.0)
+    threshold, air_level = air_threshold(smooth[::2, ::2, ::2])
+    rough = _solid(smooth > threshold)
+    sigma = 4.0 / volume.spacing
+    weight = ndimage.gaussian_filter(rough.astype(np.float32), sigma, truncate=2.5)
+    tissue = ndimage.gaussian_filter(np.where(rough, smooth, 0.0), sigma, truncate=2.5) / np.maximum(weight, 1e-3)
+    fine = (smooth > air_level + 0.5 * (tissue - air_level)) & (weight > 0.05)
+    core = ndimage.binary_erosion(rough, iterations=3)
+    return _solid(fine | core)
+
+
+def _solid(bright: Mask) -> Mask:
+    """Largest piece of a bright region with its holes filled and its skin closed."""
+    closed = ndimage.binary_closing(bright, ndimage.generate_binary_structure(3, 1), iterations=2, border_value=0)
+    body = ~outside_air(~(closed | bright))
+    opened = ndimage.binary_opening(body, iterations=2)
+    label, count = ndimage.label(opened)
+    if count == 0:
+        raise DataError("no body found in the MR volume: check that it shows the breast")
+    largest = 1 + int(np.argmax(np.bincount(label.ravel())[1:]))
+    return np.asarray(ndimage.binary_dilation(label == largest, iterations=2) & body, dtype=np.bool_)

@@ -1,0 +1,69 @@
+"""Skin, fat and gland of the breast from a bias-corrected MR volume."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from skimage.filters import threshold_otsu
+
+from mammoreg.errors import DataError
+from mammoreg.geometry import Volume
+from mammoreg.imaging.mr_body import Mask
+
+BACKGROUND, FAT, GLAND, SKIN, MUSCLE = range(5)
+SKIN_MM = 2.0
+"""Thickness of the skin label: breast skin measures 1 to 3 mm, one or two voxels."""
+OUTLIER_SPANS = 4.0
+"""Intensities further from the median than this many spans (median to 5th percentile of fat's side) are cut to it."""
+
+
+def depth_below_skin(body: Mask, spacing: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Distance in mm of each body voxel's centre from the air's border; the grid's faces are no border."""
+    distance = ndimage.distance_transform_edt(np.pad(body, 1, mode="edge"), sampling=spacing)[1:-1, 1:-1, 1:-1]
+    return np.asarray(np.maximum(distance - 0.5 * spacing[0], 0.0) * body, dtype=np.float32)
+
+
+def is_fat_suppressed(intensity: NDArray[np.float32], depth: NDArray[np.float32], breast: Mask) -> bool:
+    """Tell from the image whether fat is dark: then the skin outshines the fat beneath it.
+
+    Without suppression the outermost 2 mm are darker than what follows, be the skin thick or only a partial volume.
+
+    Raises:
+        DataError: no skin or no fat beneath it in the breast.
+    """
+    skin = intensity[breast & (depth > 0.5) & (depth < 2.0)]
+    beneath = intensity[breast & (depth > 2.8) & (depth < 4.5)]
+    if skin.size == 0 or beneath.size == 0:
+        raise DataError("the breast is too small to tell skin from fat: check side and field of view")
+    return bool(np.median(skin) > np.median(beneath))
+
+
+def gland_threshold(samples: NDArray[np.float32], fat_suppressed: bool) -> float:
+    """Intensity between fat and gland: Otsu's, with outliers on gland's side (vessels, failed fat suppression) cut.
+
+    Raises:
+        DataError: no samples.
+    """
+    if samples.size == 0:
+        raise DataError("the breast is too small to tell gland from fat: check side and field of view")
+    sign = 1.0 if fat_suppressed else -1.0
+    signed = sign * samples
+    median, low = np.percentile(signed, [50.0, 5.0])
+    return float(sign * threshold_otsu(np.clip(signed, low, median + OUTLIER_SPANS * (median - low))))
+
+
+def label_tissues(
+    volume: Volume, body: Mask, breast: Mask, depth: NDArray[np.float32], fat_suppressed: bool
+) -> NDArray[np.uint8]:
+    """Label map: fat, gland and skin in the breast; all of the body behind it counts as muscle/chest wall.
+
+    Gland is the bright class below the skin in a fat-suppressed volume and the dark one otherwise.
+    """
+    inner = breast & (depth > SKIN_MM)
+    threshold = gland_threshold(volume.data[breast & (depth > 2.0 * SKIN_MM)], fat_suppressed)
+    gland = (volume.data > threshold) == fat_suppressed
+    labels = np.zeros(body.shape, np.uint8)
+    labels[body] = MUSCLE
+    labels[breast] = SKIN
+    labels[inner & gland] = GLAND
+    labels[inner & ~gland] = FAT
+    return labels
