@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Points
 from mammoreg.localization.lesions import (
     LesionArea,
@@ -92,7 +93,12 @@ def view_areas(inputs: Inputs, pose: Artefact) -> dict[str, LesionArea]:
     if path is None:
         return {}
     if path.suffix != ".tsv":
-        return {MASK_NAME: area_from_mask(canonical_image(pose, read_image_mask(path)))}
+        mask, size = read_image_mask(path), (pose.value("stored_rows"), pose.value("stored_columns"))
+        if mask.shape != size:
+            raise DataError(
+                f"{path}: the mask has {mask.shape} rows and columns, its mammogram {size}; draw it on the image"
+            )
+        return {MASK_NAME: area_from_mask(canonical_image(pose, mask))}
     per_mm = 1.0 / breast_scale_mm(view_geometry(pose))
     found = {}
     for name, (pixel, diameter_mm) in read_discs(path).items():

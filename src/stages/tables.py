@@ -8,7 +8,7 @@ from stages.contract import Inputs, SettingsModel, Stage, Subject
 from stages.tabulating.layout import LANDMARKS, TABLE_5, TABLE_6, TABLES, Row, Table
 from stages.tabulating.netcdf import cohort_netcdf
 from stages.tabulating.render import Section, as_csv, as_html, as_markdown, cells, section_of
-from stages.tabulating.statistics import Group, groups, incomplete, statistics_rows
+from stages.tabulating.statistics import Group, groups, incomplete, readable_rows, statistics_rows
 
 _INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate")
 
@@ -45,8 +45,7 @@ def _files(table: Table, rows: Sequence[Row], found: Sequence[Group], failures: 
     for group in found:
         statistics = statistics_rows(group)
         first += incomplete(statistics)
-        shown = [{k: v for k, v in row.items() if k not in ("table", "group")} for row in statistics]
-        sections.append(section_of(f"Statistics: {group.label}", shown))
+        sections.append(section_of(f"Statistics: {group.label}", readable_rows(statistics)))
     text = cells(table, rows)
     sections.append(Section("Measurements", table.columns, text))
     return {

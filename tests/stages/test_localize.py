@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mammoreg.geometry import lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
@@ -137,6 +138,32 @@ def test_directions_do_not_read_each_others_marks(both_ways: Artefact, tmp_path:
     assert only_mr.value("mr_rows") == []
     assert only_views.value("mr_rows") == both_ways.value("mr_rows")
     assert only_views.value("mammogram_rows") == only_views.value("compressed_rows") == []
+
+
+def write_mask(path: Path, size: tuple[int, int], flips: tuple[bool, bool] = (False, False)) -> Path:
+    rows, columns = np.mgrid[: size[0], : size[1]]
+    column, row = synthetic.stored(synthetic.true_pixel("CC", LESION), flips)
+    mask = np.hypot(columns - column, rows - row) < 30
+    Image.fromarray(mask.astype(np.uint8) * 255).save(path)
+    return path
+
+
+def test_a_mask_is_read_as_stored(tmp_path: Path) -> None:
+    flips = (True, True)
+    inputs = synthetic.write_case(tmp_path, views=("CC",), flips=flips)
+    mask = write_mask(tmp_path / "mask.png", (synthetic.ROWS, synthetic.COLUMNS), flips)
+    found = localized(inputs | {"lesion_CC": mask}, tmp_path / "localize.h5")
+    curve = found.array("mr/updated/lesion0/curve_CC", "mm")
+    assert np.linalg.norm(curve - LESION, axis=1).min() < 0.6
+    assert [row["name"] for row in rows_of(found, "mr_rows")] == ["lesion"]
+
+
+def test_a_mask_of_another_size_ends_with_a_message(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    mask = write_mask(tmp_path / "mask.png", (500, 300))
+    found = localized(inputs | {"lesion_CC": mask}, tmp_path / "localize.h5")
+    assert found.status == "failed"
+    assert "(500, 300)" in found.message
 
 
 def test_one_view_gives_curve_and_midpoint(tmp_path: Path) -> None:

@@ -143,6 +143,9 @@ def test_readable_tables_say_first_what_is_missing(folder: Path) -> None:
     assert first[0] == "**bad failed: mesh: turned inside out**"
     assert first[2] == "**rigid: 2 of 3 lesions in the mammograms have a prediction**"
     assert text.count("turned inside out") == 1
+    cells = [cell.strip() for cell in next(line for line in text.splitlines() if "| updated" in line).split("|")]
+    assert cells[1:8] == ["updated", "2 of 3", "3.00 (1.00)", "3.00", "4.00", "100.0", "65.0"]
+    assert cells[9:11] == ["11 of 11", "4.30 (1.03)"]
     page = (folder / "table_5_mammogram.html").read_text()
     assert page.index("turned inside out") < page.index("2 of 3") < page.index("<table>")
 

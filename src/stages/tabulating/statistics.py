@@ -65,6 +65,28 @@ def statistics_rows(group: Group) -> list[dict[str, Any]]:
     return rows
 
 
+def readable_rows(statistics: Sequence[Mapping[str, str]]) -> list[dict[str, str]]:
+    """The same in fewer columns and in words; a column that is empty in all rows is left out."""
+    rows = [{"method": row["method"], **_words(row, ""), **_words(row, "paper_")} for row in statistics]
+    return [{name: row[name] for name in row if any(other[name] for other in rows)} for row in rows]
+
+
+def _words(row: Mapping[str, str], prefix: str) -> dict[str, str]:
+    def of(name: str) -> str:
+        return row[f"{prefix}{name}"]
+
+    words = {
+        "n of N": f"{of('n')} of {of('of')}" if of("of") else "",
+        "mean (SD), mm": f"{of('mean_mm')} ({of('sd_mm')})" if of("mean_mm") else "",
+        "median, mm": of("median_mm"),
+        "maximum, mm": of("max_mm"),
+        "within 5 mm, %": of("within_5_mm_percent"),
+        "nearer than rigid, %": of("improvement_percent"),
+        "overlap, %": of("overlap_percent"),
+    }
+    return {f"{'paper: ' if prefix else ''}{name}": text for name, text in words.items()}
+
+
 def incomplete(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """What a table says first: the methods that could not predict all that has a truth."""
     return [
