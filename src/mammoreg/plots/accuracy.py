@@ -5,10 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogFormatter, StrMethodFormatter
 
 from mammoreg.plots.style import NOTICE, Png, method_colour, new_figure, to_png
 
 LIMIT_MM = 5.0
+PLAIN_NUMBERS = StrMethodFormatter("{x:g}")
 _MARKERS = {"CC": "o", "MLO": "s", "3D": "^"}
 
 
@@ -49,7 +51,7 @@ def _draw_errors(axes: Axes, panel: ErrorPanel) -> None:
 
 @dataclass(frozen=True)
 class RuntimePoint:
-    """One run: its method, view, elements a side, median error in mm and time in s."""
+    """One run: its method, view, elements a side, mean error in mm and time in s."""
 
     method: str
     view: str
@@ -59,32 +61,35 @@ class RuntimePoint:
 
 
 def error_against_runtime(points: Sequence[RuntimePoint]) -> Png:
-    """Error against total time on logarithmic axes; a line joins the meshes of one method and view."""
+    """Error against time on logarithmic axes: each run faint, the means of a method over meshes joined by a line."""
     with new_figure(6.4, 4.4) as figure:
         axes = figure.subplots()
-        series: dict[tuple[str, str], list[RuntimePoint]] = {}
-        for point in sorted(points, key=lambda p: p.elements):
-            series.setdefault((point.method, point.view), []).append(point)
-        for (method, view), runs in series.items():
-            time, error = [run.total_s for run in runs], [run.error_mm for run in runs]
-            axes.plot(
-                time,
-                error,
-                f"-{_MARKERS.get(view, 'o')}",
-                color=method_colour(method),
-                lw=1.2,
-                ms=5,
-                label=f"{method} {view}",
-            )
+        for method in dict.fromkeys(point.method for point in points):
+            runs = [point for point in points if point.method == method]
             for run in runs:
-                place = (run.total_s, run.error_mm)
-                axes.annotate(str(run.elements), place, textcoords="offset points", xytext=(4, 3), fontsize=7)
+                marker = _MARKERS.get(run.view, "o")
+                axes.plot(run.total_s, run.error_mm, marker, color=method_colour(method), ms=3.2, alpha=0.35, mew=0)
+            _draw_means(axes, method, runs)
         axes.set_xscale("log")
         axes.set_yscale("log")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_formatter(PLAIN_NUMBERS)
+            axis.set_minor_formatter(LogFormatter(minor_thresholds=(2.0, 0.9)))
         axes.grid(True, which="both", color="#e6e6e6", lw=0.6)
-        axes.set_xlabel("time from mesh to prediction, processor seconds (s)")
+        axes.set_xlabel("processor time from mesh to solution (s)")
         axes.set_ylabel("mean distance to the truth (mm)")
-        axes.legend(ncols=2)
-        axes.set_title("Error against computing time; numbers: elements a side", loc="left")
+        axes.legend()
+        axes.set_title("Error against computing time; numbers: elements a side")
         figure.suptitle(NOTICE, fontsize=8, color="#444444")
         return to_png(figure)
+
+
+def _draw_means(axes: Axes, method: str, runs: Sequence[RuntimePoint]) -> None:
+    """One point a mesh, with its elements a side beside it."""
+    elements = sorted({run.elements for run in runs})
+    chosen = [[run for run in runs if run.elements == n] for n in elements]
+    time = [float(np.mean([run.total_s for run in same])) for same in chosen]
+    error = [float(np.mean([run.error_mm for run in same])) for same in chosen]
+    axes.plot(time, error, "-o", color=method_colour(method), lw=1.5, ms=6, label=method)
+    for n, x, y in zip(elements, time, error, strict=True):
+        axes.annotate(str(n), (x, y), textcoords="offset points", xytext=(5, 4), fontsize=8)

@@ -1,0 +1,1 @@
+"""Studies: targets of their own, which run stages on variations of a cohort."""
