@@ -11,7 +11,6 @@ from typing import Any, Protocol, TextIO
 from stages.errors import UserError
 from stages.threads import compute_with_one_thread
 
-
 LAST_OF_A_CASE = "figures"
 
 

@@ -1,4 +1,4 @@
-# What every rule shares: the checked configuration, the cohort, and where files lie.
+# The checked configuration, the cohort, and where files lie.
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
@@ -73,11 +73,11 @@ def scope(stage):
 def named(stage, folder="", suffix=".h5"):
     """Pattern of a stage's artefact, or of its log or benchmark in the folder of that name."""
     pattern = {
-        "view": "{case}/" + stage + ".{view}",
-        "case": "{case}/" + stage,
+        "view": f"{{case}}/{stage}.{{view}}",
+        "case": f"{{case}}/{stage}",
         "cohort": stage,
-    }[scope(stage)]
-    return str(RESULTS / folder / (pattern + suffix))
+    }
+    return str(RESULTS / folder / f"{pattern[scope(stage)]}{suffix}")
 
 
 def log_of(stage):
@@ -102,11 +102,7 @@ def artefacts_of(stage, case=None, view=None):
     if scope(stage) == "cohort":
         return [named(stage)]
     if scope(stage) == "case":
-        return [
-            named(stage).format(case=c)
-            for c in cases
-            if COHORT.views(c) or stage not in ("localize", "evaluate")
-        ]
+        return [named(stage).format(case=c) for c in cases]
     views = {c: COHORT.views(c) if view is None else [view] for c in cases}
     return [named(stage).format(case=c, view=v) for c in cases for v in views[c]]
 

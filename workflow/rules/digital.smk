@@ -11,14 +11,14 @@ for case, files in MADE.items():
             str(PROJECT / "results" / "digital" / "logs" / f"{case}.log"),
         benchmark:
             str(PROJECT / "results" / "digital" / "benchmarks" / f"{case}.tsv")
+        resources:
+            mem_mb=lambda wildcards, attempt: 1500 * attempt,
+            runtime=20,
         params:
             stage="digital",
             settings=settings_of("digital"),
             code=stage_digest("digital"),
             subject={"case": case, "laterality": case_row(case).laterality},
-        resources:
-            mem_mb=lambda wildcards, attempt: 1500 * attempt,
-            runtime=20,
         message:
             f"{case}: digital patient"
         script:

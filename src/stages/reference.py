@@ -1,0 +1,108 @@
+"""What is written from the pydantic models: schemas, config.yaml and the tables of config/README.md.
+
+`make generated` writes them; a test keeps them equal to the models.
+"""
+
+import json
+import re
+import sys
+import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from stages.cases import CaseRow, ViewRow
+from stages.config import config_model
+
+WIDTH = 116
+
+
+def reference_files(project: Path) -> dict[Path, str]:
+    """Texts by path; the hand-written part of config/README.md is kept.
+
+    Args:
+        project: root of the project.
+    """
+    readme = project / "config" / "README.md"
+    models = {"config": config_model(), "cases": CaseRow, "views": ViewRow}
+    files = {
+        project / "workflow" / "schemas" / f"{name}.schema.json": json.dumps(model.model_json_schema(), indent=2) + "\n"
+        for name, model in models.items()
+    }
+    files[project / "config" / "config.yaml"] = config_yaml()
+    files[readme] = _with_tables(readme.read_text(encoding="utf-8"))
+    return files
+
+
+def config_yaml() -> str:
+    """The default configuration, each key under a comment that says what it means."""
+    head = "# Defaults of every key; change them here, in a file given with --configfile, or with --config key=value.\n"
+    return head + "".join(_yaml_lines(config_model(), config_model()(), ""))
+
+
+def _yaml_lines(model: type[BaseModel], defaults: BaseModel, indent: str) -> Iterator[str]:
+    for name, info in model.model_fields.items():
+        value = getattr(defaults, name)
+        yield "\n" if not indent else ""
+        yield textwrap.fill(_meaning(info), WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ") + "\n"
+        if isinstance(value, BaseModel):
+            yield f"{indent}{name}:\n"
+            yield from _yaml_lines(type(value), value, indent + "  ")
+        else:
+            text = yaml.safe_dump(defaults.model_dump(mode="json")[name], default_flow_style=True, width=1000)
+            yield f"{indent}{name}: {text.removesuffix('...' + chr(10)).strip()}\n"
+
+
+def _meaning(info: FieldInfo) -> str:
+    """Description, bounds and permitted values of a key."""
+    bounds = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
+    limits = [f"{sign} {getattr(m, key)}" for m in info.metadata for key, sign in bounds.items() if hasattr(m, key)]
+    choices = getattr(info.annotation, "__args__", ()) if "Literal" in str(info.annotation) else ()
+    extra = [*limits, *([" | ".join(map(str, choices))] if choices else [])]
+    return (info.description or "") + (f" ({', '.join(extra)})" if extra else "")
+
+
+def _with_tables(readme: str) -> str:
+    """The README with the part between each pair of markers made anew."""
+    parts = {"cases": _columns(CaseRow), "views": _columns(ViewRow), "keys": _keys()}
+    for name, text in parts.items():
+        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
+        readme = re.sub(pattern, lambda match, text=text: match[1] + text + match[2], readme, flags=re.DOTALL)
+    return readme
+
+
+def _columns(model: type[BaseModel]) -> str:
+    rows = [(f"`{n}`", "yes" if i.is_required() else "no", _meaning(i)) for n, i in model.model_fields.items()]
+    return _table(("column", "required", "meaning"), rows)
+
+
+def _keys() -> str:
+    return _table(("key", "default", "meaning"), list(_key_rows(config_model(), config_model()(), "")))
+
+
+def _key_rows(model: type[BaseModel], defaults: BaseModel, prefix: str) -> Iterator[tuple[str, ...]]:
+    for name, info in model.model_fields.items():
+        value = getattr(defaults, name)
+        if isinstance(value, BaseModel):
+            yield from _key_rows(type(value), value, f"{prefix}{name}.")
+        else:
+            yield f"`{prefix}{name}`", f"`{json.dumps(_json(defaults)[name])}`", _meaning(info)
+
+
+def _json(model: BaseModel) -> Mapping[str, Any]:
+    return model.model_dump(mode="json")
+
+
+def _table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = [header, ("---",) * len(header), *rows]
+    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |\n" for line in lines)
+
+
+if __name__ == "__main__":
+    for path, text in reference_files(Path(sys.argv[1] if len(sys.argv) > 1 else ".")).items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
