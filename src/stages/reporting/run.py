@@ -1,0 +1,66 @@
+"""How the results came about: a paragraph to quote, settings and versions."""
+
+import json
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from stages.artefact import Artefact
+from stages.tabulating.render import Section
+
+_LIBRARIES = ("numpy", "scipy", "scikit-fem", "scikit-image", "pypardiso", "simpleitk", "nibabel", "pydicom", "h5py")
+
+METHODS_TEXT = (
+    "Mammograms and MR volumes were registered with mammoreg {version}, a re-implementation of the model-based "
+    "registration of X-ray mammograms and MR images of the female breast. The breast was segmented in the MR volume "
+    "and meshed with {elements} hexahedra by transfinite interpolation. The projection angle and the imaged portion "
+    "of the breast were estimated from the outline of the mammogram, with the header's angle as prior. The breast was "
+    "compressed as a nearly incompressible hyperelastic body between two rigid plates to the thickness given in the "
+    "mammogram's header (method plate). Its surface was then adapted to the outline of the mammogram, and the "
+    "interior was solved anew under the displacements of that surface (method updated). Lesions and landmarks marked "
+    "in the MR volume were carried through the deformation and projected through the cone beam of the mammography "
+    "unit; lesions marked in the mammograms were back-projected into the deformed breast and carried into the "
+    "undeformed one, where two views intersect. Methods rigid (undeformed breast, nipples aligned) and scaling "
+    "(volume-preserving scaling along the beam) serve for comparison. Distances in a mammogram are detector distances "
+    "divided by the magnification at the middle of the plates; overlap is the share of the true lesion that the "
+    "prediction covers. Research use only."
+)
+
+
+def methods_paragraph(artefacts: Sequence[Artefact]) -> str:
+    """The methods text for these artefacts."""
+    meshes = sorted({int(a.value("n")) for a in artefacts if a.stage == "mesh" and a.has("n")})
+    elements = " or ".join(f"{n} x {n} x {n}" for n in meshes) or "n x n x n"
+    versions = sorted({a.attrs["package_version"] for a in artefacts if "package_version" in a.attrs})
+    return METHODS_TEXT.format(version=", ".join(versions), elements=elements)
+
+
+def settings_section(artefacts: Sequence[Artefact]) -> Section:
+    """Every setting of every stage; one that differs between cases is listed with all its values."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for artefact in artefacts:
+        for key, value in json.loads(artefact.attrs.get("settings", "{}")).items():
+            texts = found.setdefault((artefact.stage, key), [])
+            text = _plain(value)
+            texts += [text] if text not in texts else []
+    rows = [[stage, key, "; ".join(texts)] for (stage, key), texts in found.items()]
+    return Section("Settings", ["stage", "setting", "value"], rows)
+
+
+def _plain(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def versions_section(artefacts: Sequence[Artefact]) -> Section:
+    """Version of this package, of the code of each stage (first characters of its digest) and of the libraries."""
+    own = sorted({a.attrs["package_version"] for a in artefacts if "package_version" in a.attrs})
+    codes = dict.fromkeys((a.stage, a.attrs["code"][:12]) for a in artefacts if "code" in a.attrs)
+    rows = [["mammoreg", ", ".join(own)], *([name, _installed(name)] for name in _LIBRARIES)]
+    return Section("Versions", ["what", "version"], [*rows, *([f"code of {stage}", code] for stage, code in codes)])
+
+
+def _installed(library: str) -> str:
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return "not installed"
