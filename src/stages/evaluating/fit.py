@@ -66,7 +66,7 @@ def fit_rows(
         projected = detector_mm(way.deformation.forward(block.points), way.geometry)
         fit = outline_fit(outline, outline.of_model(projected, block.skin_quads()))
         row: Row = {"view": view, "method": method, **_placed(way.geometry, pose.laterality)}
-        row |= {"force_n": _number(solution, "force_n")} | _fit_columns(fit, way.geometry)
+        row |= {"force_n": _plate_force(solution)} | _fit_columns(fit, way.geometry)
         row["ncc"] = _number(of_view([a for a in results if a.stage == "project"], view), f"{method}_ncc")
         row["trust"] = "; ".join([*pose.value("flags"), *_doubts(row, solution, beam_gaps.get(method), limits)])
         rows.append(row)
@@ -103,6 +103,13 @@ def _doubts(row: Row, solution: Artefact | None, gap_mm: float | None, limits: L
         f"beams miss each other by {gap_mm or 0:.1f} mm": gap_mm is not None and gap_mm > limits.beam_gap_mm,
     }
     return [text for text, holds in doubts.items() if holds]
+
+
+def _plate_force(solution: Artefact | None) -> float | None:
+    """Mean force of both plates, which balance but for the back's share."""
+    forces = [_number(solution, f"force_{plate}_n") for plate in ("lower", "upper")]
+    known = [force for force in forces if force is not None]
+    return sum(known) / len(known) if known else None
 
 
 def _number(artefact: Artefact | None, name: str) -> float | None:
