@@ -7,7 +7,7 @@ import json
 import re
 import sys
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,7 @@ def reference_files(project: Path) -> dict[Path, str]:
         project: root of the project.
     """
     readme = project / "config" / "README.md"
-    models = {"config": config_model(), "cases": CaseRow, "views": ViewRow}
+    models: dict[str, type[BaseModel]] = {"config": config_model(), "cases": CaseRow, "views": ViewRow}
     files = {
         project / "workflow" / "schemas" / f"{name}.schema.json": json.dumps(model.model_json_schema(), indent=2) + "\n"
         for name, model in models.items()
@@ -70,8 +70,8 @@ def _with_tables(readme: str) -> str:
     """The README with the part between each pair of markers made anew."""
     parts = {"cases": _columns(CaseRow), "views": _columns(ViewRow), "keys": _keys()}
     for name, text in parts.items():
-        pattern = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
-        readme = re.sub(pattern, lambda match, text=text: match[1] + text + match[2], readme, flags=re.DOTALL)
+        pattern = rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->)"
+        readme = re.sub(pattern, text.replace("\\", r"\\"), readme, count=1, flags=re.DOTALL)
     return readme
 
 
@@ -97,7 +97,7 @@ def _json(model: BaseModel) -> Mapping[str, Any]:
     return model.model_dump(mode="json")
 
 
-def _table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+def _table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
     lines = [header, ("---",) * len(header), *rows]
     return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |\n" for line in lines)
 
