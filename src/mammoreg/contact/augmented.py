@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mammoreg.contact.plate import Array, Gap, Plate
 from mammoreg.contact.surface import ContactSurface
@@ -51,6 +52,7 @@ class ContactTerms:
     traction: Array
     distance: Array
     plate_force: Array
+    flat: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,8 @@ class PlateContact:
     friction: float = 0.0
     tangential_penalty: float = 20.0
     growth: float = 4.0
+    smoothing_mm: float = 0.05
+    lip: float = 50.0
 
     def start(self, nodes: Array, plates: Sequence[Plate], height: float = 0.0) -> ContactState:
         """State without any contact yet at nodes (N, 3)."""
@@ -78,35 +82,37 @@ class PlateContact:
         """Forces and tangent with the plates' common extra `height` in mm."""
         points = self.surface.positions(nodes) - np.array([0.0, 0.0, height])
         relative = self._relative(nodes, plates, height)
-        pressures, tractions, distances, forces = [], [], [], []
+        pressures, tractions, distances, forces, flats = [], [], [], [], []
         point_force, point_stiffness = np.zeros(points.shape), np.zeros((*points.shape, 3))
         for k, plate in enumerate(plates):
             gap = plate.gap(points)
-            pressure = np.maximum(state.multiplier[k] - state.penalty * gap.distance, 0.0)
-            point_stiffness += self._normal_stiffness(gap, pressure, state.penalty)
+            penalty = np.where(gap.flat, state.penalty, np.minimum(self.lip, state.penalty))
+            pressure, slope = smooth_ramp(state.multiplier[k] - penalty * gap.distance, penalty * self.smoothing_mm)
+            point_stiffness += _normal_stiffness(gap, pressure, slope * penalty)
             traction = np.zeros(points.shape)
             if self.friction > 0.0:
                 slip = relative[k] - state.anchor[k]
-                traction, stiffness = self._friction(gap.normal, pressure, state.traction[k], slip, state.penalty)
+                traction, stiffness = self._friction(gap.normal, pressure, state.traction[k], slip, slope * penalty)
                 point_stiffness += stiffness
             force = (pressure[..., None] * gap.normal + traction) * self.surface.area[..., None]
             point_force -= force
             pressures.append(pressure)
             tractions.append(traction)
             distances.append(gap.distance)
+            flats.append(gap.flat)
             forces.append(force.sum(axis=(0, 1)))
         face_force, face_stiffness = self._to_corners(point_force, point_stiffness)
         return ContactTerms(
-            face_force, face_stiffness, np.stack(pressures), np.stack(tractions), np.stack(distances), np.stack(forces)
+            face_force,
+            face_stiffness,
+            np.stack(pressures),
+            np.stack(tractions),
+            np.stack(distances),
+            np.stack(forces),
+            np.stack(flats),
         )
 
-    def _normal_stiffness(self, gap: Gap, pressure: Array, penalty: float) -> Array:
-        """Derivative of minus the normal traction by the position (F, q, 3, 3), kPa/mm."""
-        dyad = gap.normal[..., :, None] * gap.normal[..., None, :]
-        active = (pressure > 0.0)[..., None, None]
-        return np.asarray(np.where(active, penalty * dyad - pressure[..., None, None] * gap.hessian(), 0.0))
-
-    def _friction(self, normal: Array, pressure: Array, old: Array, slip: Array, penalty: float) -> tuple[Array, Array]:
+    def _friction(self, normal: Array, pressure: Array, old: Array, slip: Array, penalty: Array) -> tuple[Array, Array]:
         """Return mapping: friction traction (F, q, 3) and minus its derivative by the position (F, q, 3, 3)."""
         tangent = np.eye(3) - normal[..., :, None] * normal[..., None, :]
         trial = np.einsum("fqij,fqj->fqi", tangent, old - self.tangential_penalty * slip)
@@ -118,7 +124,7 @@ class PlateContact:
         along = direction[..., :, None] * direction[..., None, :]
         stick = self.tangential_penalty * tangent
         turn = share[..., None, None] * self.tangential_penalty * (tangent - along)
-        press = self.friction * penalty * direction[..., :, None] * normal[..., None, :]
+        press = self.friction * penalty[..., None, None] * direction[..., :, None] * normal[..., None, :]
         stiffness = np.where(slipping[..., None, None], turn + press, stick)
         stiffness = np.where((pressure > 0.0)[..., None, None], stiffness, 0.0)
         return trial * share[..., None], stiffness
@@ -134,3 +140,15 @@ class PlateContact:
         flat = interpolation.reshape(-1, 13)
         product = weighted @ interpolation
         return force.reshape(faces, -1) @ flat, flat.T @ product.reshape(faces, -1, 13)
+
+
+def smooth_ramp(value: Array, width: Array) -> tuple[Array, Array]:
+    """max(value, 0) rounded by a parabola within +-width, and its slope; a kink makes Newton's method cycle."""
+    inside = np.clip(value / width + 1.0, 0.0, 2.0)
+    return np.where(inside < 2.0, 0.25 * width * inside**2, value), 0.5 * inside
+
+
+def _normal_stiffness(gap: Gap, pressure: Array, stiffness: Array) -> Array:
+    """Derivative of minus the normal traction by the position (F, q, 3, 3), kPa/mm."""
+    dyad = gap.normal[..., :, None] * gap.normal[..., None, :]
+    return np.asarray(stiffness[..., None, None] * dyad - pressure[..., None, None] * gap.hessian())

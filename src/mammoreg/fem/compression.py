@@ -29,9 +29,12 @@ class CompressionOptions:
         newton: when an iteration ends.
     """
 
-    rule: Rule = "gauss2"
-    penalty_per_mm: float = 1.0
-    stiffest_per_mm: float = 30.0
+    rule: Rule = "gauss3"
+    penalty_per_mm: float = 2.0
+    stiffest_per_mm: float = 50.0
+    lip_per_mm: float = 5.0
+    growth: float = 5.0
+    smoothing_mm: float = 0.05
     tangential_per_mm: float = 1.0
     first_step: float = 0.5
     least_step: float = 1.0 / 128.0
@@ -110,7 +113,16 @@ class Compression:
         surface = ContactSurface(model.points, skin_quads, self.options.rule)
         mu = float(np.average(model.material.mu_kpa, weights=model.volume))
         penalty, tangential = self.options.penalty_per_mm * mu, self.options.tangential_per_mm * mu
-        self.contact = PlateContact(surface, penalty, self.options.stiffest_per_mm * mu, friction, tangential)
+        self.contact = PlateContact(
+            surface,
+            penalty,
+            self.options.stiffest_per_mm * mu,
+            friction,
+            tangential,
+            self.options.growth,
+            self.options.smoothing_mm,
+            self.options.lip_per_mm * mu,
+        )
         held = np.zeros(model.points.shape, dtype=bool)
         held[back.nodes] = back.held
         self.equilibrium = Equilibrium(model, held, back, self.contact, back.holds_height)

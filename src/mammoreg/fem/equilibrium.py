@@ -30,7 +30,7 @@ class NewtonOptions:
 
     residual: float = 1e-4
     increment_mm: float = 0.02
-    contact_mm: float = 0.02
+    contact_mm: float = 0.1
     iterations: int = 25
     augment_below: float = 0.02
     least_det: float = 0.1
@@ -167,7 +167,8 @@ class Equilibrium:
         if self.contact is None or state.contact is None or forces.contact is None:
             return state
         penalty = min(state.contact.penalty * self.contact.growth, self.contact.stiffest)
-        memory = replace(state.contact, multiplier=forces.contact.pressure, penalty=penalty)
+        multiplier = np.where(forces.contact.flat, forces.contact.pressure, state.contact.multiplier)
+        memory = replace(state.contact, multiplier=multiplier, penalty=penalty)
         return replace(state, contact=memory)
 
     def _unbalance(self, forces: Forces, pending: Array) -> float:
@@ -182,7 +183,10 @@ class Equilibrium:
         """Largest distance, mm, by which a contact point misses its plate (penetration or leftover multiplier)."""
         if self.contact is None or forces.contact is None or state.contact is None:
             return 0.0
-        return float(np.abs(forces.contact.pressure - state.contact.multiplier).max()) / state.contact.penalty
+        if state.contact.penalty < self.contact.stiffest:
+            return float("inf")
+        excess = np.abs(forces.contact.pressure - state.contact.multiplier)
+        return float(np.where(forces.contact.flat, excess, 0.0).max()) / state.contact.penalty
 
     def _step(self, state: State, forces: Forces, pending: Array, options: NewtonOptions) -> tuple[State, float]:
         """One linear solve; the update is shortened until no element collapses."""
