@@ -2,6 +2,7 @@
 
 import ast
 import hashlib
+import re
 from functools import cache
 from pathlib import Path
 
@@ -25,6 +26,8 @@ def module_digest(module: str, source: Path = SOURCE) -> str:
     digest = hashlib.sha256()
     for name in sorted(seen):
         digest.update(f"{name}\n{_syntax(name, source)}\n".encode())
+        for path in _data_files(name, source):
+            digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
@@ -54,6 +57,17 @@ def _imports(module: str, source: Path) -> tuple[str, ...]:
     ours = {name for name in names if name.split(".")[0] in PACKAGES}
     parents = {name.rsplit(".", n)[0] for name in ours | {module} for n in range(1, name.count(".") + 1)}
     return tuple(sorted(name for name in ours | parents if _file(name, source) is not None))
+
+
+def _data_files(module: str, source: Path) -> list[Path]:
+    """Files beside a module that it names in a text constant, such as a folder of templates."""
+    path = _file(module, source)
+    texts = {n.value for n in ast.walk(_parse(module, source)) if isinstance(n, ast.Constant) and type(n.value) is str}
+    folder = path.parent if path else source
+    named = [folder / text for text in sorted(texts) if re.fullmatch(r"[\w.-]*\w", text)]
+    folders = [p for p in named if p.is_dir() and not (p / "__init__.py").exists()]
+    files = [p for p in named if p.is_file() and p.suffix != ".py"]
+    return files + [member for folder in folders for member in sorted(folder.rglob("*")) if member.is_file()]
 
 
 @cache

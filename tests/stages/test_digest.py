@@ -55,6 +55,16 @@ def test_code_at_any_distance_changes_it(source, name, old, new):
     assert after != before
 
 
+def test_template_that_a_module_names_changes_it(source):
+    (source / "stages" / "templates").mkdir()
+    template = source / "stages" / "templates" / "page.j2"
+    template.write_text("one")
+    before, named = _after(source, "a.py", "def f(x):", 'FOLDER = "templates"\n\ndef f(x):')
+    assert named != before
+    template.write_text("two")
+    assert module_digest("stages.a", source) != named
+
+
 def test_unknown_module(source):
     with pytest.raises(ModuleNotFoundError, match="stages.nothing"):
         module_digest("stages.nothing", source)
