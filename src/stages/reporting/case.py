@@ -36,6 +36,7 @@ class CasePage:
     troubles: Sequence[str]
     warnings: Sequence[str]
     headline: Sequence[tuple[str, str]]
+    exported: bool
     pictures: Sequence[ReportPicture]
     sections: Sequence[Section]
 
@@ -57,15 +58,21 @@ def case_page(name: str, laterality: str, artefacts: Sequence[Artefact]) -> Case
         [f"{a.view}: {a.message}" if a.view else a.message for a in failures],
         _warnings(artefacts),
         _headline(artefacts),
+        any(name.startswith("export/") for a in artefacts if a.has("files") for name in a.value("files")),
         [picture for a in artefacts if a.stage == "figures" for picture in _pictures(a)],
         [section for section in _sections(artefacts) if section.rows],
     )
 
 
 def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
-    """What speaks against a view's result."""
-    rows = VIEWS.rows(artefacts)
-    return [f"{row['view']}, {row['method']}: {row['trust']}" for row in rows if row.get("trust")]
+    """What speaks against the full registration, and what stages remarked."""
+    rows = [row for row in VIEWS.rows(artefacts) if row["method"] == SHOWN_METHOD and row.get("trust")]
+    found = [f"{row['view']}: {row['trust']}" for row in rows]
+    for artefact in artefacts:
+        for name in ("warnings", "flags"):
+            remarks = artefact.value(name) if artefact.has(name) else []
+            found += [f"{artefact.view or artefact.stage}: {remark}" for remark in remarks]
+    return list(dict.fromkeys(found))
 
 
 def _headline(artefacts: Sequence[Artefact]) -> list[tuple[str, str]]:
@@ -126,9 +133,7 @@ def _names(localize: Artefact, value: str) -> list[str]:
 def _section(heading: str, table: Table, artefacts: Sequence[Artefact], names: set[str] | None = None) -> Section:
     """A table's rows of this case without the columns that are empty throughout; `names` limits what is shown."""
     rows = [row for row in table.rows(artefacts) if names is None or row["name"] in names]
-    filled = [
-        column for column in table.columns if column != "case" and any(row.get(column) is not None for row in rows)
-    ]
+    filled = [c for c in table.columns if c != "case" and any(row.get(c) not in (None, "") for row in rows)]
     place = [table.columns.index(column) for column in filled]
     return Section(heading, filled, [[line[i] for i in place] for line in cells(table, rows)])
 

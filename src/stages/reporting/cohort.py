@@ -58,8 +58,13 @@ def statistics_sections(statistics: Statistics) -> list[Section]:
         counts = [f"{row['n']} of {row['of']}" for row in rows]
         for line, count in zip(lines, counts, strict=True):
             line.insert(1, count)
-        sections.append(Section(str(group).capitalize(), [header[0], "n of N", *header[1:]], lines))
+        sections.append(Section(_sentence(group), [header[0], "n of N", *header[1:]], lines))
     return sections
+
+
+def _sentence(text: str) -> str:
+    """The text with a capital first letter, the others as they are."""
+    return text[:1].upper() + text[1:]
 
 
 def excluded_rows(cohort: Cohort) -> list[tuple[str, str]]:
@@ -82,7 +87,7 @@ def errors_picture(artefacts: Sequence[Artefact], statistics: Statistics) -> str
         "landmarks in the compressed volume": [row for row in landmarks if row["view"] == "3D"],
     }
     panels = [
-        ErrorPanel(group.split(", ")[0].capitalize(), _by_method(rows), _paper_means(statistics, group))
+        ErrorPanel(_sentence(group.split(", ")[0]), _by_method(rows), _paper_means(statistics, group))
         for group, rows in kinds.items()
         if any(row["distance_mm"] is not None for row in rows)
     ]
