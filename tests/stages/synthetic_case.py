@@ -85,18 +85,18 @@ def write_mesh(path: Path, laterality: Laterality) -> Path:
     return path
 
 
-def write_pose(path: Path, laterality: Laterality, view: str, flip_rows: bool, flip_columns: bool) -> Path:
+def write_pose(path: Path, laterality: Laterality, view: str, flips: tuple[bool, bool], outlined: bool) -> Path:
     g = geometry(view)
     placed = {name: getattr(g, name) for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")}
     values: dict[str, Any] = {**placed, **{f"rigid_{name}": value for name, value in placed.items()}}
     values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": []}
     values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}
-    values |= {"flip_rows": flip_rows, "flip_columns": flip_columns}
+    values |= {"flip_rows": flips[0], "flip_columns": flips[1]}
     outline = _outline(view)
-    arrays = {
-        "outline": Array(outline, "px", "outline"),
-        "outline_weight": Array(np.ones(len(outline)), "1", "trust in the outline"),
-    }
+    arrays = {}
+    if outlined:
+        arrays["outline"] = Array(outline, "px", "outline")
+        arrays["outline_weight"] = Array(np.ones(len(outline)), "1", "trust in the outline")
     for name, affine in {"rigid": turning(view), "scaling": compression(view)}.items():
         arrays[f"{name}_matrix"] = Array(affine.matrix, "1", name)
         arrays[f"{name}_offset"] = Array(affine.offset, "mm", name)
@@ -130,13 +130,14 @@ def write_case(
     views: tuple[str, ...] = ("CC", "MLO"),
     flips: tuple[bool, bool] = (False, False),
     compressed: bool = False,
+    outlined: bool = True,
 ) -> dict[str, list[Path]]:
     """All artefacts before `localize`, as inputs by name."""
     folder.mkdir(parents=True, exist_ok=True)
     inputs = {
         "segment": [write_segment(folder / "segment.h5", laterality, compressed)],
         "mesh": [write_mesh(folder / "mesh.h5", laterality)],
-        "pose": [write_pose(folder / f"pose.{v}.h5", laterality, v, *flips) for v in views],
+        "pose": [write_pose(folder / f"pose.{v}.h5", laterality, v, flips, outlined) for v in views],
     }
     for stage in ("compress", "solve"):
         inputs[stage] = [write_solution(folder / f"{stage}.{v}.h5", laterality, stage, v) for v in views]

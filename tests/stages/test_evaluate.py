@@ -114,6 +114,15 @@ def test_elongation_is_the_closed_form(tmp_path: Path) -> None:
         assert rows[direction]["true_mm"] == pytest.approx(expected, abs=0.5)
 
 
+def test_plates_without_any_image_have_no_fit(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("3D",), outlined=False)
+    found = evaluated(tmp_path, inputs)
+    assert found.ok
+    assert found.value("elongation_rows") == []
+    row = rows_of(found, "view_rows", "plate")[0]
+    assert (row["outline_mean_mm"], row["outline_dice"], row["force_n"]) == (None, None, 80.0)
+
+
 def test_a_failed_case_counts_with_empty_distances(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path)
     inputs["segment"] = [synthetic.write_failed(tmp_path / "bad.h5", "R", "segment", message="volume is NaN")]

@@ -11,7 +11,7 @@ from mammoreg.metrics.elongation import Direction, extents_mm
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
 from stages.artefact import Artefact
-from stages.evaluating.fit import pose_outline
+from stages.evaluating.fit import has_outline, pose_outline
 from stages.evaluating.predictions import Row
 from stages.methods import view_geometry
 
@@ -24,8 +24,9 @@ def elongation_rows(pose: Artefact, block: BlockMesh, methods: Mapping[str, Meth
     All are measured on the rays on which the mammogram's outline is skin, and divided by the magnification at the
     plates' middle; the undeformed breast is projected in parallel at the view's angle.
     """
-    geometry = view_geometry(pose)
-    outline = pose_outline(pose)
+    if not has_outline(pose):
+        return []
+    geometry, outline = view_geometry(pose), pose_outline(pose)
     standing = replace(geometry, parallel=True)
     before = _extents(outline, breast_to_plate(block.points, geometry.angle_deg), block, standing)
     true = extents_mm(outline.points(), outline.theta, outline.weight)

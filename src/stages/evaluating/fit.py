@@ -8,8 +8,7 @@ import numpy as np
 from mammoreg.geometry import ViewGeometry
 from mammoreg.localization.deformation import MethodView
 from mammoreg.meshing.block import BlockMesh
-from mammoreg.metrics.distances import breast_scale_mm
-from mammoreg.metrics.outline_fit import OutlineFit, outline_fit
+from mammoreg.metrics.outline_fit import outline_fit
 from mammoreg.pose.outline import RadialOutline, radial_outline
 from mammoreg.pose.silhouette import detector_mm, ray_angles
 from stages.artefact import Artefact
@@ -36,8 +35,13 @@ class Limits:
     min_det_f: float
 
 
+def has_outline(pose: Artefact) -> bool:
+    """Whether a view has an outline: not if it has neither image nor second volume."""
+    return "outline" in pose.names()
+
+
 def pose_outline(pose: Artefact) -> RadialOutline:
-    """The mammogram's outline on rays, mm at the detector."""
+    """The outline in the image on rays, mm at the detector."""
     geometry = view_geometry(pose)
     pixels = pose.array("outline", "px")
     forward = (pixels[:, 0] + 0.5) * geometry.pixel_mm
@@ -59,14 +63,12 @@ def fit_rows(
         results: artefacts of `compress`, `solve` and `project`.
         beam_gaps: largest gap of the beams to a lesion, by method.
     """
-    outline, view = pose_outline(pose), str(pose.view)
+    outline, view = pose_outline(pose) if has_outline(pose) else None, str(pose.view)
     rows = []
     for method, way in methods.items():
         solution = of_view([a for a in results if a.stage == MESH_METHODS.get(method)], view)
-        projected = detector_mm(way.deformation.forward(block.points), way.geometry)
-        fit = outline_fit(outline, outline.of_model(projected, block.skin_quads()))
         row: Row = {"view": view, "method": method, **_placed(way.geometry, pose.laterality)}
-        row |= {"force_n": _plate_force(solution)} | _fit_columns(fit, way.geometry)
+        row |= {"force_n": _plate_force(solution)} | _fit_columns(outline, block, way)
         row["ncc"] = _number(of_view([a for a in results if a.stage == "project"], view), f"{method}_ncc")
         row["trust"] = "; ".join([*pose.value("flags"), *_doubts(row, solution, beam_gaps.get(method), limits)])
         rows.append(row)
@@ -84,11 +86,16 @@ def _placed(geometry: ViewGeometry, laterality: str) -> Row:
     }
 
 
-def _fit_columns(fit: OutlineFit, geometry: ViewGeometry) -> Row:
-    scale = breast_scale_mm(geometry) / geometry.pixel_mm
+def _fit_columns(outline: RadialOutline | None, block: BlockMesh, way: MethodView) -> Row:
+    """Misfit of the method's silhouette at the magnification of the plates' middle; empty without an outline."""
+    if outline is None:
+        return {"outline_mean_mm": None, "outline_p95_mm": None, "outline_dice": None}
+    projected = detector_mm(way.deformation.forward(block.points), way.geometry)
+    fit = outline_fit(outline, outline.of_model(projected, block.skin_quads()))
+    zoom = way.geometry.middle_magnification
     return {
-        "outline_mean_mm": None if fit.mean_mm is None else fit.mean_mm * scale,
-        "outline_p95_mm": None if fit.p95_mm is None else fit.p95_mm * scale,
+        "outline_mean_mm": None if fit.mean_mm is None else fit.mean_mm / zoom,
+        "outline_p95_mm": None if fit.p95_mm is None else fit.p95_mm / zoom,
         "outline_dice": fit.dice,
     }
 
