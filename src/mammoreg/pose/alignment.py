@@ -22,7 +22,7 @@ class Alignment:
     Attributes:
         view: the shifted geometry.
         model: silhouette of the model in that view.
-        gap_mm: signed distance (K,) from model to outline along its normal, at the plates' middle; nan where either ends.
+        gap_mm: distance (K,) from model to outline along its normal, at the plates' middle; nan where either ends.
         weight: trust (K,) of each gap.
         rms_mm: weighted root mean square of the gaps.
     """

@@ -68,6 +68,28 @@ def fit_scaling(
     return Scaling(np.diag(scale) @ plate_rotation(view.angle_deg), offset, share, high - low, state)
 
 
+def fit_thickness(
+    skin: Points, quads: NDArray[np.intp], view: ViewGeometry, outline: RadialOutline, shares: tuple[float, float]
+) -> float:
+    """Plate gap, mm, at which the breast, widened alike in both directions, meets the outline best.
+
+    The paper takes it from the diameters in MR and mammogram (section II-C); so does this, from all diameters at once.
+
+    Args:
+        skin, quads, view, outline: as in `fit_scaling`; the view's thickness is not read.
+        shares: smallest and largest gap that is considered, as shares of the uncompressed height.
+    """
+    turned = breast_to_plate(skin, view.angle_deg)
+    low, high = _imaged_heights(turned, view.edge_p_mm)
+
+    def misfit(share: float) -> float:
+        at = replace(view, thickness_mm=share * (high - low))
+        return _aligned(turned, quads, at, outline, 0.5, low, high, False).rms_mm
+
+    found = minimize_scalar(misfit, bounds=shares, method="bounded", options={"xatol": 0.01})
+    return float(found.x) * (high - low)
+
+
 def _imaged_heights(turned: Points, edge_p_mm: float) -> tuple[float, float]:
     front = turned[:, 1] < edge_p_mm
     heights = turned[front, 2] if front.sum() >= MIN_FRONT_NODES else turned[:, 2]

@@ -1,0 +1,45 @@
+"""Springs that draw points of a body's faces onto planes: how an outline acts on the skin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PlaneTies:
+    """Points on quadrilateral faces, each drawn to a plane by a spring along its normal.
+
+    Attributes:
+        nodes: corners (T, 4) of the face that carries each point.
+        shape: shares (T, 4) of the corners at the point.
+        direction: unit normals (T, 3) of the planes.
+        offset: places (T,) of the planes along their normals, mm.
+        stiffness: spring constants (T,), mN/mm.
+    """
+
+    nodes: NDArray[np.int64]
+    shape: Array
+    direction: Array
+    offset: Array
+    stiffness: Array
+
+    def distance(self, positions: Array) -> Array:
+        """Distance (T,) of the points from their planes at deformed nodes (N, 3), mm."""
+        points = np.einsum("ta,tai->ti", self.shape, positions[self.nodes])
+        return np.einsum("ti,ti->t", points, self.direction) - self.offset
+
+    def force(self, positions: Array) -> Array:
+        """Residual (T, 12) in mN."""
+        pull = self.stiffness * self.distance(positions)
+        return np.asarray(self._rows() * pull[:, None])
+
+    def blocks(self) -> Array:
+        """Stiffness (T, 12, 12) in mN/mm, constant."""
+        rows = self._rows()
+        return np.asarray(self.stiffness[:, None, None] * rows[:, :, None] * rows[:, None, :])
+
+    def _rows(self) -> Array:
+        return np.asarray((self.shape[:, :, None] * self.direction[:, None, :]).reshape(len(self.nodes), 12))

@@ -1,0 +1,77 @@
+"""Surface of the compressed breast that meets the mammogram's outline."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mammoreg.fem.closing import Closed, Closing
+from mammoreg.geometry import ViewGeometry
+from mammoreg.meshing.skin import SkinFacets
+from mammoreg.pose.alignment import Alignment, measure
+from mammoreg.pose.outline import RadialOutline
+from mammoreg.shape.outline_ties import outline_ties
+
+REST_DAMPING = 0.05
+
+
+@dataclass(frozen=True)
+class ShapeEstimate:
+    """The breast with its silhouette on the outline.
+
+    Attributes:
+        closed: the breast between the plates, drawn to the outline.
+        before, after: silhouettes against the outline.
+        rounds: how often the ties were renewed.
+    """
+
+    closed: Closed
+    before: Alignment
+    after: Alignment
+    rounds: int
+
+
+def estimate_shape(
+    closing: Closing,
+    closed: Closed,
+    faces: NDArray[np.integer],
+    facets: SkinFacets,
+    view: ViewGeometry,
+    outline: RadialOutline,
+    stiffness: float,
+    rounds: int,
+    settled_mm: float,
+) -> ShapeEstimate:
+    """Draw the silhouette onto the outline and let the body follow between the plates.
+
+    The ties are renewed on the silhouette that they have made, and advanced by what they fell short of, until the
+    mean misfit is settled.
+
+    Args:
+        closing: the breast and its plates; `closed` is its result for the gap.
+        faces: skin faces (F, 4) from which `facets` were cut.
+        view: geometry of the image in the frame of `closed`.
+        outline: the mammogram's outline.
+        stiffness: of the ties, in units of the mean shear modulus per mm of outline.
+        rounds: at most.
+        settled_mm: the ties are renewed while the mean misfit is above this.
+
+    Raises:
+        NotConvergedError: with the reason.
+    """
+    before = after = measure(facets.positions(closed.deformed), facets.quads, view, outline)
+    mu_kpa = float(np.average(closing.model.material.mu_kpa, weights=closing.model.volume))
+    memory = np.zeros(len(outline.theta))
+    done = 0
+    while done < rounds and _mean_misfit(after) > settled_mm:
+        ties, _ = outline_ties(closed.deformed, faces, facets, view, outline, stiffness * mu_kpa, memory)
+        closed = closing.rest(closed, ties, REST_DAMPING)
+        after = measure(facets.positions(closed.deformed), facets.quads, view, outline)
+        memory = memory + np.where(after.weight > 0, np.nan_to_num(after.gap_mm), 0.0) * view.middle_magnification
+        done += 1
+    return ShapeEstimate(closed, before, after, done)
+
+
+def _mean_misfit(state: Alignment) -> float:
+    full = state.weight > 0.99
+    return float(np.abs(state.gap_mm[full]).mean()) if full.any() else 0.0

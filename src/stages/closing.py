@@ -1,0 +1,89 @@
+"""The closing plates of stage `compress` as an object, built anew from artefacts where a later stage goes on from it."""
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from mammoreg.contact.soft import SoftMemory
+from mammoreg.fem.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.damped import DampedState
+from stages.artefact import Artefact
+from stages.contract import Array, Value
+from stages.mechanics import Mechanics, PlacedBreast, place_breast
+from stages.methods import block_mesh
+
+_MEMORY = {"anchor": "mm", "traction": "kPa", "pressure": "kPa"}
+
+
+def placed_breast(mesh: Artefact, angle_deg: float, mechanics: Mechanics, mu_kpa: float) -> PlacedBreast:
+    """The breast of a mesh artefact, turned to a projection angle."""
+    gland = mesh.array("gland_fraction", "1") if mechanics.gland_contrast != 1.0 else None
+    return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland)
+
+
+def closing_plates(breast: PlacedBreast, edge_p_mm: float, mechanics: Mechanics, options: ClosingOptions) -> Closing:
+    """Plates around a placed breast."""
+    return Closing(
+        breast.model,
+        breast.skin_quads,
+        breast.back,
+        edge_p_mm if mechanics.plates_end else None,
+        mechanics.lip_radius_mm,
+        mechanics.friction,
+        options,
+    )
+
+
+def kept_values(mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, angle_deg: float) -> dict[str, Value]:
+    """What later stages need to know of a compression."""
+    return {
+        "mechanics": mechanics.model_dump(),
+        "options": asdict(options),
+        "mu_kpa": mu_kpa,
+        "angle_deg": angle_deg,
+    }
+
+
+def kept_arrays(closed: Closed) -> dict[str, Array]:
+    """The state of a breast between plates, from which `resumed` goes on."""
+    memory = closed.state.memory
+    names = {"anchor": "contact points at the last step", "traction": "friction", "pressure": "contact pressure"}
+    return {
+        "pressure": Array(closed.state.pressure, "kPa", "element pressures, positive in tension"),
+        **{f"contact/{n}": Array(getattr(memory, n), _MEMORY[n], f"{text}, each plate") for n, text in names.items()},
+    }
+
+
+def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closing, Closed]:
+    """The plates and the breast between them as `compress` left them, in the floating breast's own height."""
+    mechanics = Mechanics.model_validate(compress.value("mechanics"))
+    options = replace(ClosingOptions(), **_options(compress.value("options")))
+    breast = placed_breast(mesh, compress.value("angle_deg"), mechanics, compress.value("mu_kpa"))
+    closing = closing_plates(breast, edge_p_mm, mechanics, options)
+    lift = np.array([0.0, 0.0, compress.value("lift_mm")])
+    memory = SoftMemory(**{name: compress.array(f"contact/{name}", units) for name, units in _MEMORY.items()})
+    positions = compress.array("deformed", "mm") - lift
+    state = DampedState(positions, compress.array("pressure", "kPa"), compress.value("raised_mm"), memory)
+    closed = Closed(
+        deformed=positions,
+        height_mm=compress.value("height_mm") - compress.value("lift_mm"),
+        gap_mm=compress.value("thickness_mm"),
+        force_n=(compress.value("force_lower_n"), compress.value("force_upper_n")),
+        iterations=0,
+        steps=0,
+        cuts=0,
+        residuals=[],
+        restless_mm=compress.value("last_motion_mm"),
+        min_det_f=compress.value("min_det_f"),
+        volume_change=compress.value("volume_change"),
+        penetration_mm=compress.value("penetration_mm"),
+        energy_mj=compress.value("energy_mj"),
+        state=state,
+    )
+    return closing, closed
+
+
+def _options(kept: dict[str, Any]) -> dict[str, Any]:
+    known = asdict(ClosingOptions())
+    return {name: value for name, value in kept.items() if name in known}

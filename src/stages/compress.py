@@ -1,0 +1,78 @@
+"""Stage `compress`: the breast between two rigid plates (paper, section II-C, plate compression)."""
+
+from dataclasses import replace
+
+import numpy as np
+from pydantic import Field
+
+from mammoreg.fem.closing import Closed, ClosingOptions
+from stages.closing import closing_plates, kept_arrays, kept_values, placed_breast
+from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.mechanics import Mechanics
+from stages.methods import view_geometry
+
+
+class Settings(SettingsModel):
+    """Mechanics, and how the plates close."""
+
+    mechanics: Mechanics = Field(Mechanics(), description="tissue, plates and back")
+    load_steps: int = Field(8, ge=1, le=200, description="load steps at least")
+    tolerance_mm: float = Field(0.05, gt=0.0, le=1.0, description="Newton iterations end below this displacement, mm")
+    penalty_per_mm: float = Field(
+        2.0, gt=0.0, le=100.0, description="stiffness of the contact in units of the shear modulus, 1/mm"
+    )
+
+
+def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+    """Close the plates to the thickness of the pose."""
+    view = view_geometry(inputs.artefact("pose"))
+    mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
+    options = replace(
+        ClosingOptions(),
+        steps=settings.load_steps,
+        tolerance_mm=settings.tolerance_mm,
+        penalty_per_mm=settings.penalty_per_mm,
+    )
+    breast = placed_breast(inputs.artefact("mesh"), view.angle_deg, settings.mechanics, mu_kpa)
+    closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options)
+    closed = closing.close(view.thickness_mm)
+    # The floating breast is placed where the pose has seen the plates.
+    lift_mm = view.height_mm - closed.height_mm
+    deformed = closed.deformed + np.array([0.0, 0.0, lift_mm])
+    return Fields(
+        arrays={
+            "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame"),
+            "residuals": Array(np.array(closed.residuals), "1", "unbalanced over internal forces, each iteration"),
+            **kept_arrays(closed),
+        },
+        values={
+            **solve_report(closed),
+            "height_mm": view.height_mm,
+            "lift_mm": lift_mm,
+            "raised_mm": closed.state.height,
+            "uncompressed_mm": closing.uncompressed_mm,
+            **kept_values(settings.mechanics, options, mu_kpa, view.angle_deg),
+        },
+    )
+
+
+def solve_report(closed: Closed) -> dict[str, Value]:
+    """What happened in a compression."""
+    lower, upper = closed.force_n
+    return {
+        "thickness_mm": closed.gap_mm,
+        "force_n": 0.5 * (lower + upper),
+        "force_lower_n": lower,
+        "force_upper_n": upper,
+        "iterations": closed.iterations,
+        "load_steps": closed.steps,
+        "cut_steps": closed.cuts,
+        "last_motion_mm": closed.restless_mm,
+        "min_det_f": closed.min_det_f,
+        "volume_change": closed.volume_change,
+        "penetration_mm": closed.penetration_mm,
+        "energy_mj": closed.energy_mj,
+    }
+
+
+STAGE = Stage(name="compress", schema=1, inputs=("mesh", "pose", "calibrate"), settings=Settings, run=run)

@@ -1,0 +1,150 @@
+"""Stage `pose`: where the breast lay between the plates: projection angle, imaged portion and plates (section III)."""
+
+import numpy as np
+from pydantic import Field
+
+from mammoreg.errors import NotConvergedError
+from mammoreg.fem.closing import COARSE, Closing
+from mammoreg.geometry import ViewGeometry, lps_to_breast
+from mammoreg.geometry.frames import Points
+from mammoreg.meshing.block import BlockMesh
+from mammoreg.meshing.skin import skin_facets
+from mammoreg.pose.estimate import Compressed, PoseEstimate, Tissue, estimate_pose
+from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.mechanics import Mechanics, place_breast
+from stages.methods import block_mesh
+from stages.posing.affine import affine_arrays, rigid_values
+from stages.posing.seen import Seen, see_mammogram, see_second_volume
+from stages.posing.start import start_view, without_image
+from stages.posing.tissue import coarse_tissue
+
+ANGLE_AT_BOUND = "angle at its bound"
+ANGLE_FROM_HEADER = "angle not determined by the image"
+
+
+class Settings(SettingsModel):
+    """Search for the pose with a coarse compression."""
+
+    mechanics: Mechanics = Field(Mechanics(), description="tissue, plates and back of the coarse compression")
+    angle_offsets_deg: tuple[float, ...] = Field(
+        (-8.0, -4.0, 0.0, 4.0, 8.0),
+        min_length=1,
+        max_length=31,
+        description="angles to try around the header's, degrees",
+    )
+    angle_sd_deg: float = Field(5.0, gt=0.0, le=30.0, description="standard deviation of the header's angle, degrees")
+    use_density: bool = Field(True, description="let dense tissue judge the angle beside the outline")
+    thickness_shares: tuple[float, float] = Field(
+        (0.35, 0.95), description="range of an estimated thickness, as shares of the uncompressed height"
+    )
+
+
+def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+    """Estimate the pose of one view."""
+    segment, mesh = inputs.artefact("segment"), block_mesh(inputs.artefact("mesh"))
+    image = inputs.path("image")
+    if image is not None:
+        seen = see_mammogram(image, subject, "MLO" if subject.view == "MLO" else "CC")
+    elif segment.has("compressed_mask"):
+        seen = see_second_volume(segment.volume("compressed_mask").between_lps_and_breast(subject.laterality))
+    else:
+        return without_image(mesh, subject)
+    nipple = lps_to_breast(segment.array("nipple", "mm"), subject.laterality)
+    start, estimated = start_view(seen, mesh, settings.thickness_shares)
+    if seen.placed:
+        return _fields(
+            seen, mesh, nipple, start, start, {"angle_determined": True, "angle_sd_deg": None}, estimated, ()
+        )
+    mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
+    tissue = coarse_tissue(segment, mesh) if settings.use_density else None
+    found = _estimate(seen, mesh, start, settings, mu_kpa, tissue)
+    if found is None:
+        raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
+    flags = _angle_flags(found, start, settings)
+    return _fields(seen, mesh, nipple, start, found.view, _search_values(found), estimated, flags)
+
+
+def _estimate(
+    seen: Seen, mesh: BlockMesh, start: ViewGeometry, settings: Settings, mu_kpa: float, tissue: Tissue | None
+) -> PoseEstimate | None:
+    mechanics = settings.mechanics
+
+    def compress(view: ViewGeometry) -> Compressed | None:
+        breast = place_breast(mesh, view.angle_deg, mechanics.model_copy(update={"gland_contrast": 1.0}), mu_kpa)
+        edge = view.edge_p_mm if mechanics.plates_end else None
+        try:
+            closing = Closing(
+                breast.model, breast.skin_quads, breast.back, edge, mechanics.lip_radius_mm, mechanics.friction, COARSE
+            )
+            closed = closing.close(view.thickness_mm)
+        except NotConvergedError:
+            return None
+        return Compressed(closed.deformed, closed.height_mm)
+
+    facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
+    offsets, sd = settings.angle_offsets_deg, settings.angle_sd_deg
+    return estimate_pose(start, seen.outline, compress, facets, offsets, sd, tissue, seen.density)
+
+
+def _angle_flags(found: PoseEstimate, start: ViewGeometry, settings: Settings) -> tuple[str, ...]:
+    offset = found.view.angle_deg - start.angle_deg
+    bounds = min(settings.angle_offsets_deg), max(settings.angle_offsets_deg)
+    at_bound = len(settings.angle_offsets_deg) > 1 and (offset <= bounds[0] + 0.1 or offset >= bounds[1] - 0.1)
+    return tuple(
+        text for text, holds in ((ANGLE_AT_BOUND, at_bound), (ANGLE_FROM_HEADER, not found.determined)) if holds
+    )
+
+
+def _search_values(found: PoseEstimate) -> dict[str, Value]:
+    return {
+        "angle_determined": found.determined,
+        "angle_sd_deg": found.angle_sd_deg if np.isfinite(found.angle_sd_deg) else None,
+        "coarse_rms_mm": found.alignment.rms_mm,
+        "tried": [
+            {
+                "angle_deg": c.angle_deg,
+                "outline_rms_mm": c.alignment.rms_mm,
+                "density_ncc": c.ncc,
+                "misfit": c.misfit,
+                "edge_p_mm": c.alignment.view.edge_p_mm,
+            }
+            for c in found.candidates
+        ],
+    }
+
+
+def _fields(
+    seen: Seen,
+    mesh: BlockMesh,
+    nipple: Points,
+    start: ViewGeometry,
+    view: ViewGeometry,
+    search: dict[str, Value],
+    estimated: tuple[str, ...],
+    flags: tuple[str, ...],
+) -> Fields:
+    arrays: dict[str, Array] = {**seen.arrays, **affine_arrays(mesh, start, view, seen)}
+    values: dict[str, Value] = {
+        **seen.values,
+        "angle_deg": view.angle_deg,
+        "header_angle_deg": seen.geometry.angle_deg,
+        "edge_p_mm": view.edge_p_mm,
+        "middle_mm": view.middle_mm,
+        "height_mm": view.height_mm,
+        "thickness_mm": view.thickness_mm,
+        "source_detector_mm": view.source_detector_mm,
+        "support_detector_mm": view.support_detector_mm,
+        "pixel_mm": view.pixel_mm,
+        "rows": view.rows,
+        "columns": view.columns,
+        **rigid_values(mesh, start, seen, nipple),
+        **search,
+        "estimated": list(estimated),
+        "flags": [*seen.flags, *flags],
+    }
+    return Fields(arrays=arrays, values=values)
+
+
+STAGE = Stage(
+    name="pose", schema=1, inputs=("segment", "mesh", "calibrate"), optional=("image",), settings=Settings, run=run
+)

@@ -1,0 +1,59 @@
+"""Stage `solve`: the breast again with its surface's displacements as boundary conditions (II-C, updated)."""
+
+import numpy as np
+from pydantic import Field
+
+from mammoreg.fem.equilibrium import NewtonOptions
+from mammoreg.fem.prescribed import PrescribedOptions, PrescribedResult, solve_prescribed
+from stages.closing import placed_breast
+from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.mechanics import Mechanics
+
+
+class Settings(SettingsModel):
+    """When the interior is in equilibrium."""
+
+    residual: float = Field(1e-4, gt=0.0, le=0.1, description="largest ratio of unbalanced to internal forces")
+    increment_mm: float = Field(0.02, gt=0.0, le=1.0, description="largest last displacement, mm")
+
+
+def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+    """Prescribe the estimated surface and solve the interior; the back keeps the condition of `compress`."""
+    compress, shape = inputs.artefact("compress"), inputs.artefact("shape")
+    mechanics = Mechanics.model_validate(compress.value("mechanics"))
+    angle_deg, mu_kpa = float(compress.value("angle_deg")), float(compress.value("mu_kpa"))
+    # The back's springs know the floating breast, not where the pose has lifted it to.
+    lift = np.array([0.0, 0.0, float(compress.value("lift_mm"))])
+    breast = placed_breast(inputs.artefact("mesh"), angle_deg, mechanics, mu_kpa)
+    solved = solve_prescribed(
+        breast.model,
+        shape.array("skin_nodes", "1"),
+        shape.array("surface", "mm") - lift,
+        breast.back,
+        start=shape.array("deformed", "mm") - lift,
+        pressure=shape.array("pressure", "kPa"),
+        options=PrescribedOptions(newton=NewtonOptions(residual=settings.residual, increment_mm=settings.increment_mm)),
+    )
+    return Fields(
+        arrays={"deformed": Array(solved.deformed + lift, "mm", "mesh nodes under the estimated surface, plate frame")},
+        values={
+            **_report(solved),
+            "thickness_mm": compress.value("thickness_mm"),
+            "force_n": compress.value("force_n"),
+        },
+    )
+
+
+def _report(solved: PrescribedResult) -> dict[str, Value]:
+    return {
+        "iterations": solved.iterations,
+        "load_steps": solved.steps,
+        "cut_steps": solved.cuts,
+        "residuals": [float(r) for r in solved.residuals],
+        "min_det_f": solved.min_det_f,
+        "volume_change": solved.volume_change,
+        "energy_mj": solved.energy_mj,
+    }
+
+
+STAGE = Stage(name="solve", schema=1, inputs=("mesh", "compress", "shape"), settings=Settings, run=run)
