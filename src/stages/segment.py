@@ -20,7 +20,7 @@ class Settings(SettingsModel):
 
     spacing_mm: float = Field(1.4, ge=1.0, le=3.0, description="voxels of the working grid, mm (paper: 1.4)")
     forward_share: float = Field(
-        0.1, ge=0.0, le=0.5, description="back in front of the corners between breast and chest, share of their depth"
+        0.05, ge=0.0, le=0.5, description="back in front of the corners between breast and chest, share of their depth"
     )
     max_depth_mm: float = Field(120.0, ge=40.0, le=250.0, description="greatest depth of the model below the apex, mm")
     min_depth_mm: float = Field(20.0, ge=5.0, le=40.0, description="a breast that stands out less is refused, mm")

@@ -10,6 +10,9 @@ from mammoreg.geometry import Volume
 
 Mask = NDArray[np.bool_]
 
+GHOST_SHARE = 0.3
+"""Share of the surrounding tissue's intensity below which a bright place beside the body is a ghost."""
+
 
 def air_threshold(samples: NDArray[np.float32]) -> tuple[float, float]:
     """Level between air and tissue, and the mean level of air.
@@ -45,20 +48,27 @@ def body_mask(volume: Volume) -> Mask:
     """Body against air, to about half a voxel: skin closed, lungs and other dark holes filled.
 
     A global threshold finds the body; then the level half-way between air and the tissue nearby (within some 4 mm) sets
-    its border, so that bright and dark skin are cut at the same place.
+    its border, so that bright and dark skin are cut at the same place. What is much darker than the tissue of the
+    surroundings is a ghost.
 
     Raises:
         DataError: no body in the volume.
     """
     smooth = ndimage.gaussian_filter(volume.data, 0.5, truncate=3.0)
-    threshold, air_level = air_threshold(smooth[::2, ::2, ::2])
+    threshold, air = air_threshold(smooth[::2, ::2, ::2])
     rough = _solid(smooth > threshold)
-    sigma = 4.0 / volume.spacing
-    weight = ndimage.gaussian_filter(rough.astype(np.float32), sigma, truncate=2.5)
-    tissue = ndimage.gaussian_filter(np.where(rough, smooth, 0.0), sigma, truncate=2.5) / np.maximum(weight, 1e-3)
-    fine = (smooth > air_level + 0.5 * (tissue - air_level)) & (weight > 0.05)
+    nearby = _local_mean(smooth, rough, 4.0 / volume.spacing)
     core = ndimage.binary_erosion(rough, iterations=3)
+    around = np.exp(_local_mean(np.log(np.maximum(smooth, threshold)), core, 12.0 / volume.spacing))
+    fine = (smooth > air + 0.5 * (nearby - air)) & (smooth > GHOST_SHARE * around) & (nearby > 0.0)
     return _solid(fine | core)
+
+
+def _local_mean(values: NDArray[np.float32], mask: Mask, sigma: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Mean of the masked values nearby, by a Gaussian of `sigma` voxels; 0 far from the mask."""
+    weight = ndimage.gaussian_filter(mask.astype(np.float32), sigma, truncate=2.5)
+    total = ndimage.gaussian_filter(np.where(mask, values, np.float32(0.0)), sigma, truncate=2.5)
+    return np.asarray(np.where(weight > 0.02, total / np.maximum(weight, 0.02), 0.0), dtype=np.float32)
 
 
 def _solid(bright: Mask) -> Mask:

@@ -1,6 +1,7 @@
 """The breast as one smooth region in front of its back."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from mammoreg.errors import DataError
@@ -10,6 +11,12 @@ from mammoreg.imaging.mr_body import Mask
 from mammoreg.imaging.mr_chest_wall import BackSurface
 
 
+OPENING_MM = 8.0
+"""What a ball of this radius does not fit into is no breast: folds, slivers along the chest."""
+NIPPLE_MM = 3.5
+"""In the front half a ball of this radius is enough; ghosts beside the skin are thinner."""
+
+
 def breast_mask(body: Mask, grid: Volume, back: BackSurface, apex: Points) -> Mask:
     """The part of the body in front of the back that hangs together with the apex, smooth to about a voxel.
 
@@ -17,19 +24,32 @@ def breast_mask(body: Mask, grid: Volume, back: BackSurface, apex: Points) -> Ma
         DataError: nothing of the body lies in front of the back.
     """
     m, p, s = (grid.origin[k] + grid.spacing[k] * np.arange(grid.shape[k]) for k in range(3))
-    limit = back.posterior(m[:, None], s[None, :])
-    distance = np.clip((limit[:, None, :] - p[None, :, None]) / grid.spacing[1] + 0.5, 0.0, 1.0)
-    front = body & (distance > 0.5)
-    opened = ndimage.binary_opening(front, _ball(round(6.0 / float(grid.spacing[0]))))
-    label, count = ndimage.label(opened)
-    if count == 0:
-        raise DataError("nothing of the body lies in front of the chest-wall surface")
-    index = np.rint(grid.to_index(apex)).astype(int)
-    near = label[tuple(slice(max(i - 12, 0), i + 13) for i in index)]
-    kept = label == np.argmax(np.bincount(near[near > 0], minlength=2)[1:]) + 1
-    grown = ndimage.binary_dilation(kept, iterations=4, mask=front)
-    soft = ndimage.gaussian_filter(grown.astype(np.float32), 1.0, truncate=3.0)
-    return np.asarray((soft > 0.5) & (distance > 0.5), dtype=np.bool_)
+    ahead = p[None, :, None] < back.posterior(m[:, None], s[None, :])[:, None, :]
+    front = body & ahead
+    thick = _piece_near(_opened(front, grid.spacing, OPENING_MM), grid, apex)
+    halfway = apex[1] + 0.5 * float(back.posterior(apex[0], apex[2]) - apex[1])
+    fine = _opened(front, grid.spacing, NIPPLE_MM) & (p < halfway)[None, :, None]
+    with_rim = ndimage.binary_dilation(thick, iterations=3, mask=front)
+    with_nipple = ndimage.binary_dilation(with_rim, iterations=4, mask=with_rim | fine)
+    return _smooth_skin(with_nipple, ahead)
+
+
+def _piece_near(mask: Mask, grid: Volume, apex: Points) -> Mask:
+    """The connected piece of a mask that fills most of the box of some 30 mm around the apex."""
+    label, _ = ndimage.label(mask)
+    index, reach = np.rint(grid.to_index(apex)).astype(int), int(17.0 / grid.spacing[0])
+    near = label[tuple(slice(max(i - reach, 0), i + reach + 1) for i in index)]
+    counts = np.bincount(near[near > 0])
+    if counts.size == 0:
+        raise DataError("no breast in front of the chest-wall surface: check side and field of view, or give mr_labels")
+    return np.asarray(label == int(np.argmax(counts)))
+
+
+def _smooth_skin(mask: Mask, ahead: Mask) -> Mask:
+    """A mask with its skin smoothed over a voxel and its rim at the back left sharp."""
+    inside = ndimage.gaussian_filter(mask.astype(np.float32), 1.0, truncate=3.0)
+    room = ndimage.gaussian_filter(ahead.astype(np.float32), 1.0, truncate=3.0)
+    return np.asarray((inside > 0.5 * room) & ahead, dtype=np.bool_)
 
 
 def back_points(breast: Mask, grid: Volume, back: BackSurface, step_mm: float = 4.0) -> Points:
@@ -44,7 +64,7 @@ def back_points(breast: Mask, grid: Volume, back: BackSurface, step_mm: float = 
     return points[valid]
 
 
-def _ball(radius: int) -> Mask:
-    """Ball of a radius in voxels."""
-    reach = np.arange(-radius, radius + 1)
-    return np.asarray((reach[:, None, None] ** 2 + reach[None, :, None] ** 2 + reach[None, None, :] ** 2) <= radius**2)
+def _opened(mask: Mask, spacing: NDArray[np.float64], radius_mm: float) -> Mask:
+    """Union of the balls of a radius that fit into a mask; the grid's faces do not bound it."""
+    centres = ndimage.distance_transform_edt(mask, sampling=spacing) > radius_mm
+    return np.asarray(ndimage.distance_transform_edt(~centres, sampling=spacing) <= radius_mm)

@@ -26,7 +26,7 @@ class BackSettings:
         upper_rise, lower_rise: rise of the bends, share of the depth.
     """
 
-    forward_share: float = 0.1
+    forward_share: float = 0.05
     max_depth_mm: float = 120.0
     min_depth_mm: float = 20.0
     default_tilt: float = 0.15

@@ -10,8 +10,10 @@ from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_body import Mask
 
 BACKGROUND, FAT, GLAND, SKIN, MUSCLE = range(5)
-SKIN_MM = 2.0
-"""Thickness of the skin label: breast skin measures 1 to 3 mm, one or two voxels."""
+SKIN_MM = 1.5
+"""Thickness of the skin label: breast skin measures 1.5 mm on average (Huang et al., Med Phys 2008)."""
+BLUR_MM = 3.0
+"""Down to this depth the skin's signal, blurred by the voxels, would pass for gland."""
 OUTLIER_SPANS = 4.0
 """Intensities further from the median than this many spans (median to 5th percentile of fat's side) are cut to it."""
 
@@ -59,11 +61,11 @@ def label_tissues(
     Gland is the bright class below the skin in a fat-suppressed volume and the dark one otherwise.
     """
     inner = breast & (depth > SKIN_MM)
-    threshold = gland_threshold(volume.data[breast & (depth > 2.0 * SKIN_MM)], fat_suppressed)
-    gland = (volume.data > threshold) == fat_suppressed
+    deep = breast & (depth > BLUR_MM)
+    gland = deep & ((volume.data > gland_threshold(volume.data[deep], fat_suppressed)) == fat_suppressed)
     labels = np.zeros(body.shape, np.uint8)
     labels[body] = MUSCLE
     labels[breast] = SKIN
-    labels[inner & gland] = GLAND
-    labels[inner & ~gland] = FAT
+    labels[inner] = FAT
+    labels[gland] = GLAND
     return labels
