@@ -58,7 +58,7 @@ def predict_in_mr(
         for number, name in enumerate(names):
             shown = [view for view in names_of if name in names_of[view]]
             usable = {view: areas[view][name] for view in shown if view in seen}
-            lost = [views.troubles.get((view, method), "") for view in shown if view not in seen]
+            lost = list(dict.fromkeys(views.troubles.get((v, method), "") for v in shown if v not in seen))
             if not usable:
                 rows.append(_line(method, name, "+".join(shown), "; ".join(lost)))
                 continue
