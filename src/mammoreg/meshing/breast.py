@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mammoreg.errors import NotConvergedError
 from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
-from mammoreg.meshing.fit import evenness, surface_fit
+from mammoreg.meshing.fit import anchor, evenness, surface_fit
 from mammoreg.meshing.layout import first_mesh
 from mammoreg.meshing.meridians import skin_meridians
 from mammoreg.meshing.quality import MeshQuality, mesh_quality
@@ -58,9 +58,9 @@ def build_mesh(mask: Volume, chest_wall_surface: Floats, nipple: Floats, n: int)
 def relax_on_surface(mesh: BlockMesh, surface: BreastSurface) -> BlockMesh:
     """Relax a first mesh, looking up the tangent planes of the surface anew in each round."""
     cell = _mean_cell(mesh)
-    even = evenness(mesh, cell)
+    lasting = SquaredTerms.stack([evenness(mesh, cell), anchor(mesh, cell)])
     for _ in range(_ROUNDS):
-        mesh = relax(mesh, cell, SquaredTerms.stack([surface_fit(mesh, surface), even]), _ITERATIONS_A_ROUND)
+        mesh = relax(mesh, cell, SquaredTerms.stack([surface_fit(mesh, surface), lasting]), _ITERATIONS_A_ROUND)
     return mesh
 
 

@@ -15,6 +15,7 @@ Indices = NDArray[np.int64]
 _FIT_WEIGHT = 30.0
 _CURVING_WEIGHT = 1.0
 _KINK_WEIGHT = 10.0
+_ANCHOR_WEIGHT = 3.0
 
 
 def surface_fit(mesh: BlockMesh, surface: BreastSurface) -> SquaredTerms:
@@ -38,6 +39,16 @@ def evenness(mesh: BlockMesh, cell: Floats) -> SquaredTerms:
             term = _differences(grid, axis, stencil)
             terms.append(term.scaled(weight * 3.0 / (len(term.offset) * cell[axis] ** 2)))
     return SquaredTerms.stack(terms)
+
+
+def anchor(mesh: BlockMesh, cell: Floats) -> SquaredTerms:
+    """Mean squared distance of the nodes from where they are, relative to the ideal cell's edges (3,), mm.
+
+    Sliding along the skin costs next to nothing otherwise, and a small change of the mask could move nodes far.
+    """
+    matrix = sparse.csr_array(sparse.eye_array(mesh.points.size))
+    weight = _ANCHOR_WEIGHT / (len(mesh.points) * float((cell**2).mean()))
+    return SquaredTerms(matrix, mesh.points.ravel()).scaled(weight)
 
 
 def _differences(grid: Indices, axis: int, stencil: Floats) -> SquaredTerms:

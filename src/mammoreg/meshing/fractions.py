@@ -26,4 +26,4 @@ def tissue_fraction(mesh: BlockMesh, labels: Volume, tissue: int, counted: tuple
     label = labels.sample(points, order=0)
     total = (weight * np.isin(label, counted)).sum(axis=1)
     part = (weight * (label == tissue)).sum(axis=1)
-    return np.divide(part, total, out=np.zeros(len(nodes)), where=total > 0)
+    return np.asarray(np.divide(part, total, out=np.zeros(len(nodes)), where=total > 0))

@@ -8,6 +8,7 @@ from scipy import sparse
 from scipy.interpolate import LinearNDInterpolator
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
 
 from mammoreg.errors import DataError
 from mammoreg.meshing.surface import BreastSurface, triangle_edges
@@ -17,6 +18,8 @@ Indices = NDArray[np.int64]
 
 # Largest distance of the pole from the apex, as a share of the radius of a half sphere of the skin's area.
 _POLE_REACH = 0.25
+# Largest gap, radians, between neighbouring rim vertices as seen from the rim's middle.
+_WIDEST_GAP = 1.0
 
 
 @dataclass(frozen=True)
@@ -62,9 +65,11 @@ def skin_meridians(surface: BreastSurface, nipple: Floats, count: int = 128, sam
     ends = 0.999 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     # Far from the rim a harmonic map shrinks exponentially: sample densely towards the nipple.
     share = np.concatenate([[0.0], np.geomspace(0.002, 1.0, 4 * samples)])
-    traced = lift(middle + share[None, :, None] * (ends - middle)[:, None, :])
-    if np.isnan(traced).any():
-        raise DataError("the skin cannot be laid out flat: the breast mask's surface has holes or several rims")
+    places = middle + share[None, :, None] * (ends - middle)[:, None, :]
+    traced = lift(places)
+    # Between two rim vertices the circle lies outside their chord.
+    beyond = np.isnan(traced).any(axis=-1)
+    traced[beyond] = vertices[cKDTree(disc).query(places[beyond])[1]]
     return Meridians(angles, np.stack([_resample(curve, samples) for curve in traced]))
 
 
@@ -88,6 +93,9 @@ def _map_to_disc(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
     around = vertices[rim][:, [0, 2]]
     low, high = around.min(axis=0), around.max(axis=0)
     around = (around - 0.5 * (low + high)) / (high - low)
+    turns = np.sort(np.arctan2(around[:, 1], around[:, 0]))
+    if np.diff(turns, append=turns[0] + 2.0 * np.pi).max() > _WIDEST_GAP:
+        raise DataError("the breast mask's skin does not end in one rim around the chest-wall surface: check both")
     disc = np.zeros((len(vertices), 2))
     disc[rim] = around / np.linalg.norm(around, axis=1, keepdims=True)
     free = np.setdiff1d(np.arange(len(vertices)), rim)

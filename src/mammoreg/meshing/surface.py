@@ -83,7 +83,7 @@ def breast_surface(mask: Volume, chest_wall_surface: Floats) -> BreastSurface:
     voxel = float(mask.spacing.max())
     back = _back_cloud(chest_wall_surface, vertices.mean(axis=0))
     height, alignment = _relation_to_back(vertices, normals, back)
-    is_back = _smooth_labels((np.abs(height) < 2.0 * voxel) & (alignment > 0.5), triangles)
+    is_back = _smooth_labels((np.abs(height) < 3.0 * voxel) & (alignment > 0.5), triangles)
     skin_triangles = _largest_piece(triangles[~is_back[triangles].any(axis=1)])
     if len(skin_triangles) < 200 or is_back.sum() < 50:
         raise DataError(
