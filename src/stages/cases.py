@@ -143,13 +143,13 @@ def read_cohort(cases: Path, views: Path | None) -> Cohort:
         FaultsError: all that is wrong in them, at once.
     """
     faults: list[Fault] = []
-    case_rows = _read_rows(cases, CaseRow, faults)
-    view_rows = _read_rows(views, ViewRow, faults) if views else []
+    case_rows, ids = _read_rows(cases, CaseRow, faults)
+    view_rows = _read_rows(views, ViewRow, faults)[0] if views else []
     faults += _duplicates(cases, [(n, (row.case,)) for n, row in case_rows])
     for number, row in case_rows:
         faults += _orphans(cases, number, row)
     if views:
-        faults += _view_faults(views, view_rows, {row.case for _, row in case_rows}, cases.name)
+        faults += _view_faults(views, view_rows, ids, cases.name)
     if not case_rows and not faults:
         faults.append(Fault(cases.name, "the table has no row", "add one row per breast"))
     if faults:
@@ -160,24 +160,22 @@ def read_cohort(cases: Path, views: Path | None) -> Cohort:
 AnyRow = TypeVar("AnyRow", bound=Row)
 
 
-def _read_rows(path: Path, model: type[AnyRow], faults: list[Fault]) -> list[tuple[int, AnyRow]]:
-    """Rows of a table with their line numbers; what is wrong is added to `faults`."""
+def _read_rows(path: Path, model: type[AnyRow], faults: list[Fault]) -> tuple[list[tuple[int, AnyRow]], set[str]]:
+    """Good rows of a table with their line numbers, and the ids of all; what is wrong is added to `faults`."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             lines = [[cell.strip() for cell in line] for line in csv.reader(file, delimiter="\t")]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         faults.append(Fault(str(path), f"cannot be read ({reason})", "give a tab-separated table in UTF-8"))
-        return []
+        return [], set()
     if header_faults := _header_faults(path, lines[0] if lines else [], model):
         faults += header_faults
-        return []
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        if any(line):
-            row = _row(path, number, lines[0], line, model, faults)
-            rows += [(number, row)] if row else []
-    return rows
+        return [], set()
+    filled = [(number, line) for number, line in enumerate(lines[1:], start=2) if any(line)]
+    column = lines[0].index("case")
+    found = [(number, _row(path, number, lines[0], line, model, faults)) for number, line in filled]
+    return [(n, row) for n, row in found if row], {line[column] for _, line in filled if column < len(line)}
 
 
 def _header_faults(path: Path, header: Sequence[str], model: type[Row]) -> list[Fault]:
@@ -253,7 +251,7 @@ def _view_faults(path: Path, rows: Sequence[tuple[int, ViewRow]], cases: set[str
     faults = _duplicates(path, [(n, (row.case, row.view)) for n, row in rows if not row.exclude])
     for number, row in rows:
         where = f"{path.name} row {number} ({row.case} {row.view})"
-        if row.case not in cases:
+        if cases and row.case not in cases:
             faults.append(Fault(where, f"no case {row.case!r} in {cases_name}", "add it there or correct the id"))
         if row.image.suffix.lower() in PICTURES and row.pixel_spacing_mm is None:
             what = "a picture has no header, and the column pixel_spacing_mm is empty"

@@ -68,7 +68,7 @@ def _nifti_affine(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
     try:
         image: Any = nibabel.load(path)
         shape, affine = image.shape, image.affine
-        zooms = image.header["pixdim"][1:4]
+        zooms = _stored_spacing(path, type(image.header))
     except (OSError, EOFError, ValueError, ImageFileError) as error:
         raise DataError(f"{path}: cannot be read as NIfTI; export the volume again") from error
     if not np.all(zooms > 0):
@@ -76,6 +76,14 @@ def _nifti_affine(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
         raise DataError(f"{path}: the header's voxel spacing is {listed} mm; correct it or export the volume again")
     shape = shape[:3] if all(n == 1 for n in shape[3:]) else shape
     return shape, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
+
+
+def _stored_spacing(path: Path, header: Any) -> NDArray[np.float64]:
+    """Voxel spacing as the file has it: on loading nibabel takes 1 for 0."""
+    from nibabel.openers import ImageOpener
+
+    with ImageOpener(path) as file:
+        return np.asarray(header.from_fileobj(file, check=False)["pixdim"][1:4], dtype=float)
 
 
 def _dicom_affine(folder: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:

@@ -1,0 +1,211 @@
+"""Preflight: each kind of bad file with the message that a user reads."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from stages.cases import read_cohort
+from stages.preflight import check_cohort
+from tests.shared_data import DATA, requires_shared
+from tests.stages.cohort_files import (
+    AFFINE,
+    COLUMNS,
+    ROWS,
+    SHAPE,
+    ball,
+    write_cohort,
+    write_dicom,
+    write_tsv,
+    write_volume,
+)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_cohort(tmp_path)
+
+
+def _faults(folder):
+    return [str(fault) for fault in check_cohort(read_cohort(folder / "cases.tsv", folder / "views.tsv"))]
+
+
+def _only(folder, *parts):
+    (fault,) = _faults(folder)
+    for part in parts:
+        assert part in fault
+
+
+def test_good_cohort_has_no_fault(folder):
+    assert _faults(folder) == []
+
+
+def test_missing_file(folder):
+    (folder / "mr.nii.gz").unlink()
+    _only(
+        folder,
+        "cases.tsv (c1), column mr: there is no file",
+        "correct the path, which is relative to the table's folder",
+    )
+
+
+def test_all_missing_files_are_listed(folder):
+    for name in ("mr.nii.gz", "cc.dcm", "lesion.png", "points.tsv"):
+        (folder / name).unlink()
+    assert len(_faults(folder)) == 4
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "message"),
+    [
+        ("mr.nii.gz", "mr", "cannot be read as NIfTI; export the volume again"),
+        ("mr_lesion.nii.gz", "mr_lesion", "cannot be read as NIfTI; export the volume again"),
+        ("cc.dcm", "image", "cannot be read as DICOM; name a DICOM mammogram, a .png or a .tif"),
+        ("lesion.png", "lesion", "cannot be read as a picture; write the mask again as .png"),
+        ("points.tsv", "mr_landmarks", "cannot be read as a tab-separated table"),
+    ],
+)
+def test_unreadable_file(folder, name, column, message):
+    (folder / name).write_bytes(b"\xff\xfe\x00 rubbish")
+    _only(folder, f"column {column}: ", message)
+
+
+def test_mammogram_of_another_modality(folder):
+    write_dicom(folder / "cc.dcm", Modality="CR")
+    _only(folder, "views.tsv (c1 CC), column image", "modality is CR, not MG; name a mammogram")
+
+
+def test_mr_folder_of_another_modality(folder):
+    (folder / "series").mkdir()
+    write_dicom(folder / "series" / "IM1")
+    _with_mr(folder, "series")
+    _only(folder, "column mr: ", "modality is MG, not MR; name the folder of one MR series")
+
+
+def test_mr_folder_without_dicom(folder):
+    (folder / "series").mkdir()
+    _with_mr(folder, "series")
+    _only(folder, "column mr: ", "holds no DICOM image; name the folder of one MR series")
+
+
+def test_mr_that_is_a_mammogram(folder):
+    _with_mr(folder, "cc.dcm")
+    _only(folder, "is neither NIfTI nor a folder; give .nii, .nii.gz or the folder of one DICOM series")
+
+
+def _with_mr(folder, name):
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": name})
+
+
+def test_empty_lesion_masks(folder):
+    write_volume(folder / "mr_lesion.nii.gz", np.zeros(SHAPE, np.uint8))
+    Image.fromarray(np.zeros((ROWS, COLUMNS), np.uint8)).save(folder / "lesion.png")
+    faults = _faults(folder)
+    assert len(faults) == 2
+    assert all("the lesion mask is empty; mark the lesion or leave the cell empty" in fault for fault in faults)
+
+
+def test_lesion_masks_of_several_components_name_the_table_form(folder):
+    write_volume(folder / "mr_lesion.nii.gz", ball(SHAPE, (3, 3, 3), (8, 8, 8)))
+    Image.fromarray(255 * ball((ROWS, COLUMNS), (10, 10), (30, 20), (20, 25))).save(folder / "lesion.png")
+    first, second = _faults(folder)
+    assert "the lesion mask has 2 components; list several lesions in a .tsv" in first
+    assert "the lesion mask has 3 components; list several lesions in a .tsv" in second
+
+
+def test_lesion_mask_on_another_grid(folder):
+    moved = AFFINE.copy()
+    moved[0, 3] = 5.0
+    write_volume(folder / "mr_lesion.nii.gz", ball(SHAPE, (5, 6, 7)), moved)
+    _only(folder, "lies on another grid (12 x 14 x 16 voxels of 1.4 x 1.4 x 1.4 mm", "resample it onto the MR grid")
+
+
+def test_lesion_mask_with_turned_axes_is_on_the_same_grid(folder):
+    mask = ball(SHAPE, (5, 6, 7))
+    turned = AFFINE.copy()
+    turned[0, 0], turned[0, 3] = 1.4, -1.4 * (SHAPE[0] - 1)
+    write_volume(folder / "mr_lesion.nii.gz", mask[::-1], turned)
+    assert _faults(folder) == []
+
+
+def test_lesion_mask_of_another_size_than_the_mammogram(folder):
+    Image.fromarray(255 * ball((ROWS + 1, COLUMNS), (20, 10))).save(folder / "lesion.png")
+    _only(folder, "the mask has 41 x 30 pixels (rows x columns)", "40 x 30; draw it on the image as stored")
+
+
+def test_unknown_labels(folder):
+    write_volume(folder / "mr_labels.nii.gz", np.full(SHAPE, 7, np.uint8))
+    _only(folder, "holds the labels 7; known are 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall")
+
+
+def test_zero_spacing_of_the_volume(folder):
+    path = folder / "mr.nii"
+    write_volume(path)
+    content = bytearray(path.read_bytes())
+    content[80:92] = np.array([1.4, 0.0, 1.4], "<f4").tobytes()
+    path.write_bytes(bytes(content))
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "mr.nii"})
+    _only(folder, "the header's voxel spacing is 1.4 x 0 x 1.4 mm; correct it or export the volume again")
+
+
+def test_spacing_that_is_no_breast_mr(folder):
+    write_volume(folder / "mr.nii.gz", affine=np.diag([0.001, 0.001, 0.001, 1.0]))
+    assert any("the voxel spacing is 0.001 x 0.001 x 0.001 mm, outside 0.1 to 15" in fault for fault in _faults(folder))
+
+
+def test_volume_that_is_one_slice(folder):
+    write_volume(folder / "mr.nii.gz", np.ones((30, 30, 1), np.float32))
+    assert any("has 30 x 30 x 1 voxels, which is no volume" in fault for fault in _faults(folder))
+
+
+def test_zero_spacing_of_the_mammogram(folder):
+    write_dicom(folder / "cc.dcm", ImagerPixelSpacing=[0.0, 0.0])
+    _only(folder, "column image", "pixel_spacing_mm")
+
+
+def test_mammogram_without_spacing(folder):
+    write_dicom(folder / "cc.dcm", ImagerPixelSpacing=None)
+    _only(folder, "neither header nor table gives the pixel spacing; fill the column pixel_spacing_mm")
+
+
+def test_laterality_that_contradicts_the_header(folder):
+    write_dicom(folder / "cc.dcm", ImageLaterality="L")
+    _only(
+        folder, "the header's ImageLaterality is L, the table's laterality is R", "correct cases.tsv or name the image"
+    )
+
+
+def test_view_that_contradicts_the_header(folder):
+    write_dicom(folder / "cc.dcm", ViewPosition="MLO")
+    _only(folder, "the header's ViewPosition is MLO, the table's view is CC", "correct views.tsv or name the image")
+
+
+def test_points_without_common_names(folder):
+    write_volume(folder / "mr_2.nii.gz")
+    write_tsv(folder / "other.tsv", {"name": "Q1", "x": "1", "y": "2", "z": "3"})
+    row = {"case": "c1", "laterality": "R", "mr": "mr.nii.gz", "mr_landmarks": "points.tsv"}
+    write_tsv(folder / "cases.tsv", row | {"mr_compressed": "mr_2.nii.gz", "mr_compressed_landmarks": "other.tsv"})
+    _only(folder, "column mr_compressed_landmarks", "shares no name with", "give corresponding points the same names")
+
+
+def test_excluded_rows_and_files_that_the_workflow_makes_are_not_opened(folder):
+    (folder / "mr.nii.gz").unlink()
+    cohort = read_cohort(folder / "cases.tsv", folder / "views.tsv")
+    assert check_cohort(cohort, {folder / "mr.nii.gz"}) == []
+    row = {"case": "c2", "laterality": "R", "mr": "nowhere.nii.gz", "exclude": "implant"}
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "mr_labels.nii.gz"}, row)
+    assert _faults(folder) == []
+
+
+def test_no_patient_in_any_message(folder):
+    write_dicom(
+        folder / "cc.dcm", ImageLaterality="L", PatientName="Doe^Jane", PatientID="4711", PatientBirthDate="19700101"
+    )
+    (fault,) = _faults(folder)
+    assert not any(secret in fault for secret in ("Doe", "4711", "1970"))
+
+
+@requires_shared("twins")
+@pytest.mark.parametrize("name", ["twins", "victre", "mri"])
+def test_development_data_pass(name):
+    views = DATA / name / "views.tsv"
+    assert check_cohort(read_cohort(DATA / name / "cases.tsv", views if views.exists() else None)) == []
