@@ -10,7 +10,6 @@ from mammoreg.geometry.frames import Points
 from mammoreg.imaging.mr_body import Mask
 from mammoreg.imaging.mr_chest_wall import BackSurface
 
-
 OPENING_MM = 8.0
 """What a ball of this radius does not fit into is no breast: folds, slivers along the chest."""
 NIPPLE_MM = 3.5

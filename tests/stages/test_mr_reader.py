@@ -1,0 +1,188 @@
+"""MR volumes from NIfTI and DICOM, in any orientation, and what is refused."""
+
+from pathlib import Path
+
+import nibabel
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from pydicom.dataset import Dataset, FileMetaDataset
+from pydicom.uid import ExplicitVRLittleEndian, MRImageStorage, generate_uid
+
+from mammoreg.errors import DataError
+from mammoreg.geometry import Volume
+from stages.readers.mr import lps_volume, read_mr, read_nifti
+from tests.shared_data import DATA, requires_shared
+
+TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+def linear_field(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Intensities that linear interpolation meets exactly."""
+    return 300.0 + points @ np.array([1.0, -2.0, 0.5])
+
+
+def sampled(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> NDArray[np.float64]:
+    indices = np.moveaxis(np.indices(shape), 0, -1)
+    return linear_field(indices @ affine[:3, :3].T + affine[:3, 3])
+
+
+def centres(volume: Volume) -> NDArray[np.float64]:
+    return volume.to_world(np.moveaxis(np.indices(volume.shape), 0, -1))
+
+
+@given(axes=st.permutations([0, 1, 2]), signs=st.tuples(*[st.sampled_from([-1.0, 1.0])] * 3))
+@settings(max_examples=30, deadline=None)
+def test_every_axis_order_and_direction_lands_in_lps(axes: list[int], signs: tuple[float, float, float]) -> None:
+    affine = np.eye(4)
+    affine[:3, :3] = np.eye(3)[:, axes] * signs * np.array([1.0, 1.5, 2.5])
+    affine[:3, 3] = [-20.0, 15.0, 4.0]
+    volume = lps_volume(sampled(affine, (9, 10, 11)), affine, order=1)
+    assert np.allclose(volume.data, linear_field(centres(volume)))
+    assert np.all(volume.spacing > 0.0)
+    assert volume.data.size == 9 * 10 * 11
+
+
+@given(angles=st.tuples(*[st.floats(-0.5, 0.5)] * 3))
+@settings(max_examples=15, deadline=None)
+def test_oblique_volumes_are_resampled(angles: tuple[float, float, float]) -> None:
+    from scipy.spatial.transform import Rotation
+
+    affine = np.eye(4)
+    affine[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix() * np.array([1.0, 1.5, 2.0])
+    affine[:3, 3] = [-20.0, 15.0, 4.0]
+    data = sampled(affine, (12, 13, 14))
+    volume = lps_volume(data, affine, order=1)
+    inside = volume.data > 0.0
+    assert np.allclose(volume.data[inside], linear_field(centres(volume))[inside], atol=0.1)
+    middle = affine[:3, :3] @ np.array([5.5, 6.0, 6.5]) + affine[:3, 3]
+    assert volume.sample(middle[None])[0] == pytest.approx(linear_field(middle), abs=0.1)
+
+
+def test_nifti_round_trip_and_labels_on_the_same_voxels(tmp_path: Path) -> None:
+    affine = np.diag([1.4, -1.4, 1.4, 1.0])
+    affine[:3, 3] = [-30.0, 20.0, 5.0]
+    data = sampled(TO_RAS @ affine, (10, 11, 12))
+    nibabel.save(nibabel.Nifti1Image(data.astype(np.float32), affine), tmp_path / "mr.nii.gz")
+    nibabel.save(nibabel.Nifti1Image((data > 300.0).astype(np.uint8), affine), tmp_path / "labels.nii.gz")
+    volume, labels = read_mr(tmp_path / "mr.nii.gz"), read_nifti(tmp_path / "labels.nii.gz")
+    assert np.allclose(volume.data, linear_field(centres(volume)), atol=1e-3)
+    assert np.array_equal(labels.data, (volume.data > 300.0).astype(np.uint8))
+    assert np.array_equal(labels.origin, volume.origin)
+
+
+def test_scaled_integers_are_rescaled(tmp_path: Path) -> None:
+    image = nibabel.Nifti1Image(np.arange(1000, dtype=np.int16).reshape(10, 10, 10), np.eye(4))
+    image.header.set_slope_inter(0.5, 10.0)
+    nibabel.save(image, tmp_path / "mr.nii")
+    assert read_mr(tmp_path / "mr.nii").data.max() == pytest.approx(10.0 + 0.5 * 999.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("NaN", lambda data, header: data.__setitem__((3, 3, 3), np.nan), "not finite"),
+        ("spacing", lambda data, header: header["pixdim"].__setitem__(2, 0.0), "spacing"),
+    ],
+)
+def test_spoiled_nifti_is_refused(tmp_path: Path, name: str, change: object, message: str) -> None:
+    data = np.ones((10, 10, 10), np.float32)
+    image = nibabel.Nifti1Image(data, np.eye(4))
+    assert callable(change)
+    change(data, image.header)
+    path = tmp_path / "mr.nii"
+    nibabel.save(image, path)
+    if name == "spacing":  # nibabel mends the header on saving
+        raw = bytearray(path.read_bytes())
+        raw[84:88] = np.float32(0.0).tobytes()
+        path.write_bytes(raw)
+    with pytest.raises(DataError, match=message):
+        read_mr(path)
+
+
+def test_truncated_nifti_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mr.nii.gz"
+    nibabel.save(nibabel.Nifti1Image(np.random.default_rng(0).random((20, 20, 20)), np.eye(4)), path)
+    path.write_bytes(path.read_bytes()[:20000])
+    with pytest.raises(DataError, match="cannot be read"):
+        read_mr(path)
+
+
+def test_nifti_without_orientation_is_refused(tmp_path: Path) -> None:
+    nibabel.save(nibabel.Nifti1Image(np.ones((10, 10, 10), np.float32), None), tmp_path / "mr.nii")
+    with pytest.raises(DataError, match="orientation"):
+        read_mr(tmp_path / "mr.nii")
+
+
+def test_complex_voxels_are_refused(tmp_path: Path) -> None:
+    nibabel.save(nibabel.Nifti1Image(np.ones((10, 10, 10), np.complex64), np.eye(4)), tmp_path / "mr.nii")
+    with pytest.raises(DataError, match="grey values"):
+        read_mr(tmp_path / "mr.nii")
+
+
+def write_series(folder: Path, positions: list[float], *, modality: str = "MR", series: str = "1.2.3.4") -> None:
+    """Sagittal slices whose voxels hold the linear field, names not in slice order."""
+    affine = np.eye(4)
+    affine[:3, :3] = np.array([[0.0, 0.0, 1.0], [1.5, 0.0, 0.0], [0.0, -1.5, 0.0]])
+    for number, x in enumerate(positions):
+        affine[:3, 3] = [x, -10.0, 20.0]
+        header = Dataset()
+        header.file_meta = FileMetaDataset()
+        header.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+        header.file_meta.MediaStorageSOPClassUID = header.SOPClassUID = MRImageStorage
+        header.SOPInstanceUID = generate_uid(entropy_srcs=[series, str(number)])
+        header.file_meta.MediaStorageSOPInstanceUID = header.SOPInstanceUID
+        header.SeriesInstanceUID, header.StudyInstanceUID, header.Modality = series, "1.2.3", modality
+        header.Rows, header.Columns, header.PixelSpacing = 12, 10, [1.5, 1.5]
+        header.ImageOrientationPatient = [0, 1, 0, 0, 0, -1]
+        header.ImagePositionPatient = affine[:3, 3].tolist()
+        header.SliceThickness, header.InstanceNumber = 2.0, number + 1
+        header.SamplesPerPixel, header.PhotometricInterpretation = 1, "MONOCHROME2"
+        header.BitsAllocated, header.BitsStored, header.HighBit, header.PixelRepresentation = 16, 16, 15, 0
+        header.RescaleSlope, header.RescaleIntercept = 0.5, 0.0
+        pixels = sampled(affine, (10, 12, 1))[..., 0].T
+        header.PixelData = np.round(2.0 * pixels).astype(np.uint16).tobytes()
+        header.save_as(folder / f"{(number * 7) % 11:02d}_{series}.dcm", enforce_file_format=True)
+
+
+def test_dicom_series_is_sorted_by_position(tmp_path: Path) -> None:
+    write_series(tmp_path, [2.0 * k for k in range(9)])
+    volume = read_mr(tmp_path)
+    assert volume.shape == (9, 10, 12)
+    assert np.allclose(volume.spacing, [2.0, 1.5, 1.5])
+    assert np.abs(volume.data - linear_field(centres(volume))).max() <= 0.26
+
+
+@pytest.mark.parametrize(
+    ("positions", "modality", "message"),
+    [
+        ([0.0, 2.0, 4.0, 6.0, 10.0, 12.0, 14.0, 16.0, 18.0], "MR", "missing"),
+        ([2.0 * k for k in range(9)], "CT", "modality is CT"),
+    ],
+)
+def test_spoiled_series_are_refused(tmp_path: Path, positions: list[float], modality: str, message: str) -> None:
+    write_series(tmp_path, positions, modality=modality)
+    with pytest.raises(DataError, match=message):
+        read_mr(tmp_path)
+
+
+def test_several_series_are_refused(tmp_path: Path) -> None:
+    write_series(tmp_path, [2.0 * k for k in range(9)])
+    write_series(tmp_path, [2.0 * k for k in range(9)], series="1.2.3.5")
+    with pytest.raises(DataError, match="several DICOM series"):
+        read_mr(tmp_path)
+
+
+def test_an_empty_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no DICOM image"):
+        read_mr(tmp_path)
+
+
+@requires_shared("mri")
+def test_dicom_series_equals_its_nifti() -> None:
+    series = read_mr(DATA / "mri/69b91dc2_t1_tse_dicom")
+    nifti = read_mr(DATA / "mri/69b91dc2_t1_tse.nii.gz")
+    assert np.array_equal(series.data, nifti.data[:, 124:392])
+    assert np.allclose(series.origin, nifti.to_world(np.array([0, 124, 0])), atol=1e-2)

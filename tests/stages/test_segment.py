@@ -1,0 +1,97 @@
+"""Stage `segment` from files to fields."""
+
+from pathlib import Path
+from typing import Literal
+
+import nibabel
+import numpy as np
+import pytest
+
+from mammoreg.errors import DataError
+from mammoreg.geometry import Volume
+from stages.contract import Fields, Inputs, Subject
+from stages.readers.mr import read_nifti
+from stages.segment import Settings, run
+from tests.shared_data import DATA, requires_shared
+from tests.unit.torso_phantom import RIGHT, torso
+
+SETTINGS = Settings(spacing_mm=2.0)
+
+
+def write(volume: Volume, path: Path) -> Path:
+    affine = np.diag([*volume.spacing, 1.0])
+    affine[:3, 3] = volume.origin
+    nibabel.save(nibabel.Nifti1Image(volume.data, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine), path)
+    return path
+
+
+def segment(files: dict[str, Path], side: Literal["L", "R"] = "R", settings: Settings = SETTINGS) -> Fields:
+    return run(Inputs(files=files), settings, Subject(case="a", laterality=side))
+
+
+def test_a_mirrored_patient_gives_mirrored_results(tmp_path: Path) -> None:
+    patient = torso()
+    mirror = patient.between_lps_and_breast("L")
+    right = segment({"mr": write(patient, tmp_path / "r.nii")})
+    left = segment({"mr": write(mirror, tmp_path / "l.nii")}, "L")
+    for name in ("mr", "labels", "breast_mask"):
+        one, other = right.volumes[name].volume, left.volumes[name].volume.between_lps_and_breast("L")
+        assert np.array_equal(one.data, other.data)
+        assert np.allclose(one.origin, other.origin, atol=1e-9)
+    for name in ("nipple", "chest_wall_surface"):
+        assert np.allclose(right.arrays[name].data, left.arrays[name].data * [-1.0, 1.0, 1.0])
+
+
+def test_second_volume_leaves_only_its_mask(tmp_path: Path) -> None:
+    files = {"mr": write(torso(), tmp_path / "a.nii"), "mr_compressed": write(torso(), tmp_path / "b.nii")}
+    fields = segment(files)
+    mask = fields.volumes["compressed_mask"].volume
+    assert set(np.unique(mask.data)) == {0, 1}
+    assert set(fields.volumes) == {"mr", "labels", "breast_mask", "compressed_mask"}
+    assert fields.values["compressed_fat_suppressed"] is True
+
+
+def test_nipple_and_volume_are_those_of_the_phantom(tmp_path: Path) -> None:
+    fields = segment({"mr": write(torso(), tmp_path / "a.nii")})
+    assert np.linalg.norm(fields.arrays["nipple"].data - RIGHT.nipple_point()) < 7.5
+    a, d, c = RIGHT.axes
+    half_ellipsoid_ml = 2.0 / 3.0 * np.pi * a * d * c / 1000.0
+    assert fields.values["breast_volume_ml"] == pytest.approx(half_ellipsoid_ml, rel=0.2)
+
+
+def test_labels_on_another_grid_are_refused(tmp_path: Path) -> None:
+    patient = torso()
+    labels = Volume((patient.data > 70.0).astype(np.uint8), patient.origin + 3.0, patient.spacing)
+    files = {"mr": write(patient, tmp_path / "a.nii"), "mr_labels": write(labels, tmp_path / "b.nii")}
+    with pytest.raises(DataError, match="another grid"):
+        segment(files)
+
+
+@requires_shared("victre")
+def test_automatic_labels_agree_with_victre() -> None:
+    """The digital breast's own labels (muscle slab, no torso), which the automatic segmentation does not see."""
+    fields = segment({"mr": DATA / "victre/mr.nii.gz"}, settings=Settings())
+    labels, breast = fields.volumes["labels"].volume, fields.volumes["breast_mask"].volume.data > 0
+    index = labels.to_world(np.moveaxis(np.indices(labels.shape), 0, -1))
+    true = read_nifti(DATA / "victre/mr_labels.nii.gz").sample(index, order=0)
+    assert fields.values["fat_suppressed"] is False
+    assert dice(breast, (true > 0) & (true < 4)) > 0.96
+    assert dice(labels.data == 2, true == 2) > 0.88
+    assert dice(labels.data > 0, true > 0) > 0.98
+    assert np.linalg.norm(fields.arrays["nipple"].data - [-0.006, -60.755, -16.859]) < 4.0
+
+
+@requires_shared("victre")
+def test_given_labels_are_used() -> None:
+    files = {"mr": DATA / "victre/mr.nii.gz", "mr_labels": DATA / "victre/mr_labels.nii.gz"}
+    fields = segment(files, settings=Settings())
+    labels, breast = fields.volumes["labels"].volume, fields.volumes["breast_mask"].volume.data > 0
+    index = labels.to_world(np.moveaxis(np.indices(labels.shape), 0, -1))
+    true = read_nifti(DATA / "victre/mr_labels.nii.gz").sample(index, order=0)
+    assert dice(labels.data == 2, true == 2) > 0.99
+    assert dice(breast, (true > 0) & (true < 4)) > 0.96
+    assert not (labels.data[breast] == 4).any()
+
+
+def dice(one: np.ndarray, other: np.ndarray) -> float:
+    return float(2.0 * (one & other).sum() / (one.sum() + other.sum()))
