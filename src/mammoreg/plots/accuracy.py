@@ -11,6 +11,7 @@ from mammoreg.plots.style import NOTICE, Png, method_colour, new_figure, to_png
 
 LIMIT_MM = 5.0
 PLAIN_NUMBERS = StrMethodFormatter("{x:g}")
+_PAPER_COLOUR = "#c2185b"
 _MARKERS = {"CC": "o", "MLO": "s", "3D": "^"}
 
 
@@ -25,7 +26,7 @@ class ErrorPanel:
 
 def error_panels(panels: Sequence[ErrorPanel]) -> Png:
     """One panel a quantity: a dot for each distance, a bar for the mean, a diamond for the paper's mean."""
-    with new_figure(3.6 * len(panels), 3.4) as figure:
+    with new_figure(2.9 * len(panels), 3.1) as figure:
         for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
             _draw_errors(axes, panel)
         figure.suptitle(NOTICE, fontsize=8, color="#444444")
@@ -39,14 +40,30 @@ def _draw_errors(axes: Axes, panel: ErrorPanel) -> None:
         axes.plot(spread, found, "o", color=method_colour(method), ms=3.8, alpha=0.6, mew=0)
         if len(found):
             axes.hlines(found.mean(), place - 0.36, place + 0.36, color="#111111", lw=1.8)
+    top = _upper_limit(panel)
+    for place, method in enumerate(panel.distances):
         if method in panel.paper_mean:
-            axes.plot(place, panel.paper_mean[method], "D", mfc="none", mec="#c2185b", ms=6, mew=1.3)
+            _draw_paper(axes, place, panel.paper_mean[method], top)
     axes.axhline(LIMIT_MM, color="#999999", lw=0.9, ls="--")
     axes.set_xticks(range(len(panel.distances)), list(panel.distances))
     axes.set_xlim(-0.6, max(len(panel.distances), 1) - 0.4)
-    axes.set_ylim(0.0, None)
+    axes.set_ylim(0.0, top)
     axes.set_ylabel("distance (mm)")
     axes.set_title(panel.title)
+
+
+def _upper_limit(panel: ErrorPanel) -> float:
+    """Own distances decide; the paper's rigid registration lies far beyond."""
+    return 1.12 * max([1.4 * LIMIT_MM, *(float(value) for values in panel.distances.values() for value in values)])
+
+
+def _draw_paper(axes: Axes, place: float, mean_mm: float, top: float) -> None:
+    """A diamond at the paper's mean, or an arrow with the number where it lies beyond the axis."""
+    if mean_mm < top:
+        axes.plot(place, mean_mm, "D", mfc="none", mec=_PAPER_COLOUR, ms=6, mew=1.3)
+        return
+    text = f"{mean_mm:.0f} ↑"
+    axes.text(place, 0.985 * top, text, color=_PAPER_COLOUR, fontsize=7.5, ha="center", va="top")
 
 
 @dataclass(frozen=True)

@@ -41,10 +41,10 @@ def show_slice(
     half_x, half_y = 0.5 * volume.spacing[horizontal], 0.5 * volume.spacing[vertical]
     extent = (x[0] - half_x, x[-1] + half_x, y[0] - half_y, y[-1] + half_y)
     axes.imshow(pixels, cmap="gray", vmin=low, vmax=high, extent=extent, origin="lower", aspect="equal")
-    if plane == "axial":
-        axes.invert_yaxis()
     for overlay in overlays:
         _draw_border(axes, overlay, plane, through)
+    axes.set_xlim(extent[:2])
+    axes.set_ylim(extent[2:] if plane != "axial" else extent[:1:-1])
     axes.set_title(f"{title}, {'xyz'[normal]} = {through[normal]:.0f} mm")
     axes.set_xlabel(f"{'xyz'[horizontal]} LPS (mm)")
     axes.set_ylabel(f"{'xyz'[vertical]} LPS (mm)")

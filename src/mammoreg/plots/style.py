@@ -17,7 +17,7 @@ Png = NDArray[np.uint8]
 
 TRUE_COLOUR = "#ff3b30"
 PREDICTED_COLOUR = "#2f8bff"
-METHOD_COLOURS = {"rigid": "#9aa0a6", "scaling": "#e69f00", "plate": "#2ca02c", "updated": PREDICTED_COLOUR}
+METHOD_COLOURS = {"rigid": "#b57edc", "scaling": "#e69f00", "plate": "#2ca02c", "updated": PREDICTED_COLOUR}
 OTHER_METHOD_COLOURS = ("#b65fcf", "#00a6a6", "#8c564b")
 NOTICE = "research use only"
 

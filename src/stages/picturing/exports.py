@@ -46,11 +46,11 @@ def case_exports(case: PicturedCase) -> dict[str, bytes]:
         return {}
     files = {"README.txt": README.encode(), "mesh.vtu": _undeformed_mesh(mesh, block)}
     files |= _lesion_names(case) | _lesions_in_mr(case) | _lesions_in_mammograms(case)
-    for view in case.poses:
-        offered = [method for method in MESH_METHODS if method in case.methods[view]]
-        files |= {f"mesh_{view}_{m}.vtu": _deformed_mesh(case, block, view, m) for m in offered}
-        files |= _deformation(case, view, offered[-1]) if offered else {}
-    return files
+    solved = {view: [m for m in MESH_METHODS if m in case.methods[view]] for view in case.poses}
+    for view, methods in solved.items():
+        files |= {f"mesh_{view}_{method}.vtu": _deformed_mesh(case, block, view, method) for method in methods}
+    best = {view: methods[-1] for view, methods in solved.items() if methods}
+    return files | _deformed_volumes(case, best) | _displacements(case, best)
 
 
 def nifti_bytes(data: NDArray[Any], affine_lps: NDArray[np.float64], intent: int = 0) -> bytes:
@@ -88,23 +88,32 @@ def plate_to_lps_affine(angle_deg: float, laterality: Laterality) -> NDArray[np.
     return affine
 
 
-def _deformation(case: PicturedCase, view: str, method: str) -> dict[str, bytes]:
-    """Deformed MR volume and displacement field of one method."""
-    name = f"{view}_{method}"
-    angle = case.methods[view][method].geometry.angle_deg
+def _deformed_volumes(case: PicturedCase, methods: Mapping[str, str]) -> dict[str, bytes]:
+    """The MR volume between the plates, by one method per view."""
     files = {}
-    projected = case.projection(view)
-    if projected is not None and f"{method}/mr" in projected.volume_names():
-        volume = projected.volume(f"{method}/mr", frame="plate")
-        affine = plate_to_lps_affine(angle, case.laterality) @ volume_affine(volume)
-        files[f"mr_{name}.nii.gz"] = nifti_bytes(volume.data.astype(np.float32), affine)
+    for view, method in methods.items():
+        projected = case.projection(view)
+        if projected is not None and f"{method}/mr" in projected.volume_names():
+            volume = projected.volume(f"{method}/mr", frame="plate")
+            turned = plate_to_lps_affine(case.methods[view][method].geometry.angle_deg, case.laterality)
+            data = volume.data.astype(np.float32)
+            files[f"mr_{view}_{method}.nii.gz"] = nifti_bytes(data, turned @ volume_affine(volume))
+    return files
+
+
+def _displacements(case: PicturedCase, methods: Mapping[str, str]) -> dict[str, bytes]:
+    """Displacement fields one after the other: the mesh remembers where the breast's voxels lie."""
     segment = case.ok("segment")
-    if segment is not None:
-        grid = segment.volume("breast_mask")
-        field = displacement_field(case, view, method, grid)
+    files: dict[str, bytes] = {}
+    if segment is None:
+        return files
+    grid = segment.volume("breast_mask")
+    for view, method in methods.items():
         # NIfTI keeps the three components in its fifth axis, in its own RAS directions.
-        ras = (field * [-1.0, -1.0, 1.0]).astype(np.float32)[:, :, :, None]
-        files[f"displacement_{name}.nii.gz"] = nifti_bytes(ras, volume_affine(grid), _DISPLACEMENT_INTENT)
+        field = displacement_field(case, view, method, grid) * [-1.0, -1.0, 1.0]
+        ras = field.astype(np.float32)[:, :, :, None]
+        name = f"displacement_{view}_{method}.nii.gz"
+        files[name] = nifti_bytes(ras, volume_affine(grid), _DISPLACEMENT_INTENT)
     return files
 
 

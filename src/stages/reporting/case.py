@@ -71,8 +71,10 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
     for artefact in artefacts:
         for name in ("warnings", "flags"):
             remarks = artefact.value(name) if artefact.has(name) else []
-            found += [f"{artefact.view or artefact.stage}: {remark}" for remark in remarks]
-    return list(dict.fromkeys(found))
+            found += [
+                f"{artefact.view or artefact.stage}: {r}" for r in remarks if not any(r in text for text in found)
+            ]
+    return found
 
 
 def _headline(artefacts: Sequence[Artefact]) -> list[tuple[str, str]]:
