@@ -85,13 +85,13 @@ class HyperelasticModel:
 
     def determinants(self, positions: Array) -> Array:
         """Determinants of F (E, Q) at deformed nodes (N, 3) in mm."""
-        return np.asarray(np.linalg.det(self.deformation_gradients(positions)))
+        return _cofactors(self.deformation_gradients(positions))[1]
 
     def state(self, positions: Array) -> ElementState:
         """Kinematics and deviatoric stress at deformed nodes (N, 3) in mm; needs det F > 0."""
         gradient = self.deformation_gradients(positions)
-        det = np.linalg.det(gradient)
-        inverse = np.linalg.inv(gradient)
+        cofactors, det = _cofactors(gradient)
+        inverse = cofactors.swapaxes(-1, -2) / det[..., None, None]
         scale = det ** (-2.0 / 3.0)
         left = gradient @ gradient.transpose(0, 1, 3, 2)
         stress = (self.material.mu_kpa[:, None] * scale)[..., None] * _voigt(left)
@@ -157,6 +157,18 @@ class HyperelasticModel:
     def volume_change(self, positions: Array) -> float:
         """Relative change of the body's volume at deformed nodes (N, 3)."""
         return float((self.weights * self.determinants(positions)).sum() / self.weights.sum() - 1.0)
+
+
+def _cofactors(matrix: Array) -> tuple[Array, Array]:
+    """Cofactors and determinants of matrices (..., 3, 3), in closed form: much faster than LAPACK on small blocks."""
+    rows = [[matrix[..., i, j] for j in range(3)] for i in range(3)]
+    cofactors = np.empty_like(matrix)
+    for i in range(3):
+        above, below = rows[(i + 1) % 3], rows[(i + 2) % 3]
+        for j in range(3):
+            k, m = (j + 1) % 3, (j + 2) % 3
+            cofactors[..., i, j] = above[k] * below[m] - above[m] * below[k]
+    return cofactors, sum((rows[0][j] * cofactors[..., 0, j] for j in range(3)), np.zeros(matrix.shape[:-2]))
 
 
 def _voigt(tensor: Array) -> Array:
