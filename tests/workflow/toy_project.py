@@ -61,6 +61,7 @@ STAGE = Stage({name!r}, 1, {required!r}, Settings, run, {optional!r}, {takes_fai
 
 def make_project(folder: Path) -> Path:
     """Copy the workflow and the stages' machinery, with toy stages in place of the numerics."""
+    folder.mkdir()
     for name in ("Snakefile", "workflow", "profiles", "config"):
         source = PROJECT / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
@@ -108,7 +109,9 @@ def spoil(volume: Path) -> None:
 
 
 def snakemake(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run Snakemake in a project's copy."""
+    """Run Snakemake in a project's copy; `stdout` holds both streams."""
     environment = os.environ | {"PYTHONPATH": str(project / "src")}
     command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
-    return subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )

@@ -1,0 +1,206 @@
+"""The workflow on toy stages: whole cohorts, reruns, failures, targets, lint."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.workflow.toy_project import PROJECT, make_cohort, make_project, snakemake, spoil
+
+pytestmark = pytest.mark.xdist_group("workflow")
+
+NOTHING = "Nothing to be done"
+
+
+def _keys(cohort: Path, results: str = "my results") -> list[str]:
+    return ["--config", f"cases={cohort}/cases.tsv", f"views={cohort}/views.tsv", f"results={results}"]
+
+
+def _jobs(output: str) -> list[str]:
+    """Names of the jobs that a dry run lists."""
+    lines = output.split("Job stats:")[1].splitlines()[3:] if "Job stats:" in output else []
+    names = []
+    for line in lines:
+        if not line.strip() or line.startswith("total"):
+            break
+        names.append(line.split()[0])
+    return sorted(set(names) - {"all"})
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """A project and a cohort of two cases that ran to its end, in folders with spaces in their names."""
+    folder = tmp_path_factory.mktemp("workflow")
+    project = make_project(folder / "the project")
+    cohort = make_cohort(folder / "the data", ("a", "b"))
+    done = snakemake(project, *_keys(cohort))
+    assert done.returncode == 0, done.stdout
+    return project, cohort, done
+
+
+def test_whole_cohort(finished):
+    project, _, done = finished
+    results = project / "my results"
+    assert (results / "tables" / "complete.txt").read_text() == "a\tok\nb\tok\n"
+    names = {path.name for path in (results / "a").glob("*.h5")}
+    assert {"segment.h5", "pose.CC.h5", "solve.MLO.h5", "localize.h5", "figures.h5"} <= names
+    assert "2 of 2 cases" in done.stdout
+    assert "100%" in done.stdout
+
+
+def test_every_job_has_log_and_benchmark(finished):
+    project, _, _ = finished
+    results = project / "my results"
+    artefacts = {path.relative_to(results).with_suffix("") for path in results.glob("*/*.h5")}
+    for kind, suffix in (("logs", ".log"), ("benchmarks", ".tsv")):
+        found = {path.relative_to(results / kind).with_suffix("") for path in (results / kind).glob(f"*/*{suffix}")}
+        assert artefacts <= found
+
+
+def test_first_line_of_a_log_runs_the_same_stage_by_hand(finished, tmp_path):
+    project, _, _ = finished
+    log, artefact = project / "my results/logs/a/compress.CC.log", project / "my results/a/compress.CC.h5"
+    command = log.read_text().splitlines()[0].replace("python ", f"{sys.executable} ", 1)
+    command = command.replace("'my results/a/compress.CC.h5'", str(tmp_path / "again.h5"))
+    environment = os.environ | {"PYTHONPATH": str(project / "src")}
+    subprocess.run(command, shell=True, cwd=project, env=environment, check=True, capture_output=True)
+    assert (tmp_path / "again.h5").read_bytes() == artefact.read_bytes()
+
+
+def test_second_run_has_nothing_to_do_even_after_touching_and_copying(finished):
+    project, cohort, _ = finished
+    assert NOTHING in snakemake(project, *_keys(cohort)).stdout
+    now = time.time()
+    for path in cohort.iterdir():
+        path.write_bytes(path.read_bytes())
+        os.utime(path, (now + 5, now + 5))
+    assert NOTHING in snakemake(project, *_keys(cohort)).stdout
+
+
+def test_comment_in_the_code_reruns_nothing_and_code_reruns_what_follows(finished):
+    project, cohort, _ = finished
+    module = project / "src/stages/shape.py"
+    text = module.read_text()
+    module.write_text("# a comment\n" + text)
+    assert NOTHING in snakemake(project, *_keys(cohort), "-n").stdout
+    module.write_text(text.replace("np.full(3, settings.level)", "np.full(3, 2 * settings.level)"))
+    jobs = _jobs(snakemake(project, *_keys(cohort), "-n").stdout)
+    module.write_text(text)
+    assert {"shape", "solve", "project", "localize"} <= set(jobs)
+    assert not {"segment", "mesh", "pose", "compress", "calibrate"} & set(jobs)
+
+
+def test_changed_setting_reruns_its_stage_and_what_follows(finished, tmp_path):
+    project, cohort, _ = finished
+    (tmp_path / "mine.yaml").write_text("compress:\n  level: 2.0\n")
+    done = snakemake(project, "--configfile", str(tmp_path / "mine.yaml"), *_keys(cohort), "-n")
+    jobs = _jobs(done.stdout)
+    assert {"compress", "shape", "solve", "project", "localize", "evaluate", "tables"} <= set(jobs)
+    assert not {"segment", "mesh", "pose", "calibrate"} & set(jobs)
+
+
+def test_thickness_of_one_view_reruns_that_view_only(finished):
+    project, cohort, _ = finished
+    table = cohort / "views.tsv"
+    text = table.read_text()
+    table.write_text(text.replace("a\tCC\ta_CC.png\t0.2\t50", "a\tCC\ta_CC.png\t0.2\t55"))
+    output = snakemake(project, *_keys(cohort), "-n").stdout
+    table.write_text(text)
+    assert "a CC: pose" in output
+    assert "a MLO: pose" not in output
+    assert "b CC: pose" not in output
+
+
+def test_one_case_and_one_stage(finished):
+    project, cohort, _ = finished
+    one = snakemake(project, "-n", "--forceall", "my results/a/localize.h5", *_keys(cohort)).stdout
+    assert "a: segment" in one
+    assert "b: segment" not in one
+    forced = snakemake(project, "-n", "-f", "my results/a/compress.CC.h5", *_keys(cohort)).stdout
+    assert _jobs(forced) == ["compress"]
+
+
+def test_number_of_cores_does_not_change_a_byte(finished, tmp_path):
+    project, cohort, _ = finished
+    done = snakemake(project, *_keys(cohort, str(tmp_path / "again")), "--cores", "1")
+    assert done.returncode == 0, done.stdout
+    for path in sorted((project / "my results").glob("*/*.h5")):
+        again = tmp_path / "again" / path.relative_to(project / "my results")
+        assert again.read_bytes() == path.read_bytes(), path.name
+
+
+def test_study_is_a_target_of_its_own(finished):
+    project, cohort, _ = finished
+    jobs = _jobs(snakemake(project, "-n", "error_vs_runtime", *_keys(cohort)).stdout)
+    assert jobs == ["error_vs_runtime", "runtime"]
+
+
+def test_volume_of_nan_among_three_ends_its_case_only(tmp_path):
+    project = make_project(tmp_path / "project")
+    cohort = make_cohort(tmp_path / "data")
+    spoil(cohort / "b.nii.gz")
+    done = snakemake(project, *_keys(cohort))
+    assert done.returncode != 0
+    assert "1 of 3 cases did not finish" in done.stdout
+    assert "b: segment: b.nii.gz: holds NaN" in done.stdout
+    results = project / "my results"
+    assert (results / "tables.h5").exists()
+    assert (results / "report.html").exists()
+    assert not (results / "tables" / "complete.txt").exists()
+    assert (results / "c" / "figures.h5").exists()
+    shown = subprocess.run(
+        [sys.executable, "-m", "stages", "show", str(results / "b" / "solve.CC.h5")],
+        env=os.environ | {"PYTHONPATH": str(project / "src")},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert "solve of b CC (R): failed\n  segment: b.nii.gz: holds NaN; export the volume again" in shown
+
+
+def test_preflight_stops_before_the_first_job(tmp_path):
+    project = make_project(tmp_path / "project")
+    cohort = make_cohort(tmp_path / "data", ("a", "b"))
+    (cohort / "a.nii.gz").unlink()
+    (cohort / "b_CC.png").write_bytes(b"rubbish")
+    done = snakemake(project, *_keys(cohort))
+    assert done.returncode != 0
+    assert "2 faults found before the first job" in done.stdout
+    assert "Traceback" not in done.stdout
+    assert not (project / "my results").exists()
+
+
+def test_unknown_key_and_unknown_case(finished):
+    project, cohort, _ = finished
+    done = snakemake(project, "-n", "--config", "compres={level: 2}", *_keys(cohort)[1:])
+    assert "config, key compres: is unknown; the nearest known one is 'compress'" in done.stdout
+    done = snakemake(project, "-n", "my results/zz/segment.h5", *_keys(cohort))
+    assert "no case 'zz' in" in done.stdout
+
+
+def test_cohort_without_mammograms(finished):
+    project, cohort, _ = finished
+    done = snakemake(project, "-n", "--config", f"cases={cohort}/cases.tsv", "results=plain")
+    assert done.returncode == 0, done.stdout
+    assert "pose" not in _jobs(done.stdout)
+    assert "segment" in _jobs(done.stdout)
+
+
+def test_lint_finds_nothing_but_what_is_exempt(finished):
+    project, cohort, _ = finished
+    report = snakemake(project, "--lint", "json", *_keys(cohort))
+    checked = subprocess.run(
+        [sys.executable, str(PROJECT / "workflow/scripts/check_lint.py")],
+        input=report.stdout,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert checked.returncode == 0, checked.stdout
+
+
+def test_entry_is_short():
+    assert len((PROJECT / "Snakefile").read_text().splitlines()) <= 60
