@@ -58,9 +58,10 @@ def build_mesh(mask: Volume, chest_wall_surface: Floats, nipple: Floats, n: int)
 def relax_on_surface(mesh: BlockMesh, surface: BreastSurface) -> BlockMesh:
     """Relax a first mesh, looking up the tangent planes of the surface anew in each round."""
     cell = _mean_cell(mesh)
+    iterations = _ITERATIONS_A_ROUND * max(1, round(mesh.n / 10))
     lasting = SquaredTerms.stack([evenness(mesh, cell), anchor(mesh, cell)])
     for _ in range(_ROUNDS):
-        mesh = relax(mesh, cell, SquaredTerms.stack([surface_fit(mesh, surface), lasting]), _ITERATIONS_A_ROUND)
+        mesh = relax(mesh, cell, SquaredTerms.stack([surface_fit(mesh, surface), lasting]), iterations)
     return mesh
 
 
