@@ -66,6 +66,7 @@ STAGE = Stage(
     inputs=("segment",),
     optional=(
         *_ARTEFACTS[1:],
+        "mr",
         "mr_lesion",
         "mr_landmarks",
         "mr_compressed_landmarks",

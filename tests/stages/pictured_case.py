@@ -27,6 +27,7 @@ def write_pictured_case(
     """Inputs of stage `figures` by name; the predictions are exact, since truth and model are the same affine map."""
     inputs: dict[str, Any] = synthetic.write_case(folder, laterality, views, FLIPS, compressed="3D" in views)
     _add_volumes(inputs["segment"][0])
+    inputs["mr"] = _write_mr(folder / "mr.nii.gz")
     imaged = [pose for pose in inputs["pose"] if "3D" not in pose.name]
     for pose in imaged:
         _add_images(pose)
@@ -71,6 +72,16 @@ def _add_volumes(path: Path) -> None:
     labels = breast.with_data((inside.astype(np.uint8) + gland).astype(np.uint8))
     mr = breast.with_data((100.0 * labels.data + 20.0 * inside).astype(np.float32))
     _rewrite(path, {}, {"mr": VolumeField(mr, "1", "MR"), "labels": VolumeField(labels, "1", "tissue")})
+
+
+MR_SHAPE = (90, 75, 80)
+MR_AFFINE = np.array([[0.2, -1.5, 0, 60], [-1.4, -0.2, 0, 90], [0, 0, 1.6, -65], [0, 0, 0, 1]])
+
+
+def _write_mr(path: Path) -> Path:
+    """A volume with turned axes, of which only the grid matters; the affine is NIfTI's, to RAS."""
+    nibabel.Nifti1Image(np.zeros(MR_SHAPE, dtype=np.int16), MR_AFFINE).to_filename(path)
+    return path
 
 
 def _add_images(path: Path) -> None:

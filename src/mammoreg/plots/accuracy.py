@@ -26,8 +26,10 @@ class ErrorPanel:
 
 def error_panels(panels: Sequence[ErrorPanel]) -> Png:
     """One panel a quantity: a dot for each distance, a bar for the mean, a diamond for the paper's mean."""
-    with new_figure(2.9 * len(panels), 3.1) as figure:
-        for axes, panel in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels, strict=True):
+    widths = [1.0 + 0.5 * len(panel.distances) for panel in panels]
+    with new_figure(sum(widths), 3.1) as figure:
+        places = np.atleast_1d(figure.subplots(1, len(panels), width_ratios=widths))
+        for axes, panel in zip(places, panels, strict=True):
             _draw_errors(axes, panel)
         figure.suptitle(NOTICE, fontsize=8, color="#444444")
         return to_png(figure)
@@ -45,7 +47,7 @@ def _draw_errors(axes: Axes, panel: ErrorPanel) -> None:
         if method in panel.paper_mean:
             _draw_paper(axes, place, panel.paper_mean[method], top)
     axes.axhline(LIMIT_MM, color="#999999", lw=0.9, ls="--")
-    axes.set_xticks(range(len(panel.distances)), list(panel.distances))
+    axes.set_xticks(range(len(panel.distances)), list(panel.distances), fontsize=7)
     axes.set_xlim(-0.6, max(len(panel.distances), 1) - 0.4)
     axes.set_ylim(0.0, top)
     axes.set_ylabel("distance (mm)")

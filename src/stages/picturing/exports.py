@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import itertools
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +18,7 @@ from stages.artefact import Artefact
 from stages.marks import canonical_pixels
 from stages.methods import MESH_METHODS
 from stages.picturing.case import PicturedCase
+from stages.readers.mr_header import read_mr_grid
 
 _LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _DISPLACEMENT_INTENT = 1006
@@ -26,7 +28,7 @@ README = """Research use only.
 
 Coordinates inside the files follow each format's habit (NIfTI: RAS; VTU: LPS), all in mm.
 
-lesion_<n>_<method>_mr.nii.gz      lesion predicted from the mammograms, on the grid of the segmented MR volume
+lesion_<n>_<method>_mr.nii.gz      lesion predicted from the mammograms, on the voxels of the MR volume as given
 lesion_<n>_<method>_<view>.png     lesion predicted from the MR volume, in the mammogram's pixels as stored
 mr_<view>_<method>.nii.gz          MR volume as deformed between the plates of a view
 displacement_<view>_<method>.nii.gz  displacement of each voxel of the undeformed breast, zero outside it
@@ -173,33 +175,47 @@ def _lesion_names(case: PicturedCase) -> dict[str, bytes]:
 
 
 def _lesions_in_mr(case: PicturedCase) -> dict[str, bytes]:
-    """Regions in the MR volume, on the grid of the segmented volume."""
-    segment, predictions = case.ok("segment"), case.predictions
-    if segment is None or predictions is None:
+    """Regions in the MR volume, on the voxels of the volume that the user gave."""
+    path, predictions = case.inputs.path("mr"), case.predictions
+    if path is None or predictions is None or not case.mammogram_lesions:
         return {}
-    grid, files = segment.volume("breast_mask"), {}
+    shape, affine = mr_grid(path)
+    files = {}
     for number, name in enumerate(case.mammogram_lesions):
         for method in sorted({method for view in case.imaged for method in case.methods[view]}):
             region = predictions.region(method, name)
             if region is not None:
-                mask = on_grid(region, grid)
-                files[f"lesion_{number}_{method}_mr.nii.gz"] = nifti_bytes(mask, volume_affine(grid))
+                mask = on_grid(region, shape, affine)
+                files[f"lesion_{number}_{method}_mr.nii.gz"] = nifti_bytes(mask, affine)
     return files
 
 
-def on_grid(mask: Volume, grid: Volume) -> NDArray[np.uint8]:
-    """A mask at the voxel centres of another grid of the same frame."""
-    sampled = np.zeros(grid.shape, dtype=np.uint8)
-    low = np.maximum(np.floor(grid.to_index(mask.origin - mask.spacing)).astype(int), 0)
-    far = mask.origin + mask.spacing * np.array(mask.shape)
-    high = np.minimum(np.ceil(grid.to_index(far)).astype(int) + 1, grid.shape)
-    if (high <= low).any():
-        return sampled
-    part = tuple(slice(a, b) for a, b in zip(low, high, strict=True))
-    inside = np.zeros(grid.shape, dtype=bool)
-    inside[part] = True
-    sampled[inside] = mask.sample(grid.centres(inside), order=0) > 0.5
-    return sampled
+def mr_grid(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
+    """Shape of the MR volume as the user gave it, and its affine (4, 4) from voxel index to LPS mm."""
+    grid = read_mr_grid(path)
+    steps = [(grid.corners[far] - grid.corners[0]) / (n - 1) for far, n in zip((4, 2, 1), grid.shape, strict=True)]
+    affine = np.eye(4)
+    affine[:3, :3], affine[:3, 3] = np.array(steps).T, grid.corners[0]
+    return grid.shape, affine
+
+
+def on_grid(mask: Volume, shape: tuple[int, ...], affine: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """A mask at the voxels of another grid, by nearest neighbour.
+
+    Args:
+        mask: any grid, LPS.
+        shape: of the other grid.
+        affine: (4, 4) from its voxel indices to LPS mm.
+    """
+    found = np.zeros(shape, dtype=np.uint8)
+    ends = mask.to_world(np.array(list(itertools.product(*((-1, n) for n in mask.shape)))))
+    corners = (ends - affine[:3, 3]) @ np.linalg.inv(affine[:3, :3]).T
+    low = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, shape)
+    high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 1, 0, shape)
+    index = np.stack(np.meshgrid(*map(np.arange, low, high), indexing="ij"), axis=-1)
+    places = index @ affine[:3, :3].T + affine[:3, 3]
+    found[tuple(slice(a, b) for a, b in zip(low, high, strict=True))] = mask.sample(places, order=0) > 0.5
+    return found
 
 
 def _lesions_in_mammograms(case: PicturedCase) -> dict[str, bytes]:

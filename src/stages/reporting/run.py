@@ -15,8 +15,8 @@ METHODS_TEXT = (
     "registration of X-ray mammograms and MR images of the female breast. The breast was segmented in the MR volume "
     "and meshed with {elements} hexahedra by transfinite interpolation. The projection angle and the imaged portion "
     "of the breast were estimated from the outline of the mammogram, with the header's angle as prior. The breast was "
-    "compressed as a nearly incompressible hyperelastic body between two rigid plates to the thickness given in the "
-    "mammogram's header (method plate). Its surface was then adapted to the outline of the mammogram, and the "
+    "compressed as a nearly incompressible neo-Hookean body ({mechanics}) between two rigid plates to the thickness "
+    "given in the mammogram's header or, without it, estimated from the image (method plate). Its surface was then adapted to the outline of the mammogram, and the "
     "interior was solved anew under the displacements of that surface (method updated). Lesions and landmarks marked "
     "in the MR volume were carried through the deformation and projected through the cone beam of the mammography "
     "unit; lesions marked in the mammograms were back-projected into the deformed breast and carried into the "
@@ -32,7 +32,16 @@ def methods_paragraph(artefacts: Sequence[Artefact]) -> str:
     meshes = sorted({int(a.value("n")) for a in artefacts if a.stage == "mesh" and a.has("n")})
     elements = " or ".join(f"{n} x {n} x {n}" for n in meshes) or "n x n x n"
     versions = sorted({a.attrs["package_version"] for a in artefacts if "package_version" in a.attrs})
-    return METHODS_TEXT.format(version=", ".join(versions), elements=elements)
+    return METHODS_TEXT.format(version=", ".join(versions), elements=elements, mechanics=_mechanics(artefacts))
+
+
+def _mechanics(artefacts: Sequence[Artefact]) -> str:
+    """Tissue, friction and back of the compression in words."""
+    found = [json.loads(a.attrs["settings"]) for a in artefacts if a.stage == "compress" and "settings" in a.attrs]
+    settings = found[0].get("mechanics", {}) if found else {}
+    names = {"poisson_ratio": "Poisson's ratio", "friction": "friction coefficient", "back": "chest-wall side"}
+    texts = [f"{text} {str(settings[key]).replace('_', ' ')}" for key, text in names.items() if key in settings]
+    return ", ".join(texts) or "homogeneous"
 
 
 def settings_section(artefacts: Sequence[Artefact]) -> Section:
