@@ -2,6 +2,7 @@
 
 import csv
 import io
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -84,10 +85,11 @@ def _vtu(artefact: Artefact, n: int, points: NDArray[np.float64]) -> bytes:
         if shape == (len(hexes),)
     }
     mesh = meshio.Mesh(points, [("hexahedron", hexes)], cell_data=per_cell)
-    stream = io.BytesIO()
-    # Text, because meshio writes its own clock-free header but compresses binary blocks by zlib's version.
-    meshio.vtu.write(stream, mesh, binary=False)
-    return stream.getvalue()
+    # meshio writes VTU to named files only.
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mesh.vtu"
+        mesh.write(path)
+        return path.read_bytes()
 
 
 def _tables(artefact: Artefact) -> dict[str, bytes]:

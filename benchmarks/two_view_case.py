@@ -1,0 +1,62 @@
+"""Time and memory of one case with two views, from files to lesion, stage by stage: `make bench`.
+
+Without arguments the embedded cohort's first two-view case; else `two_view_case.py cases.tsv views.tsv case`.
+"""
+
+import csv
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+PROJECT = Path(__file__).resolve().parents[1]
+EMBEDDED = [str(PROJECT / "config/digital/cases.tsv"), str(PROJECT / "config/digital/views.tsv")]
+
+
+def first_two_view_case(views: Path) -> str:
+    with views.open(newline="") as file:
+        cases = [row["case"] for row in csv.DictReader(file, delimiter="\t")]
+    return next(case for case in cases if cases.count(case) == 2)
+
+
+def benchmark(cases: str, views: str, case: str, results: Path) -> float:
+    """Wall time in seconds from the tables to the predictions."""
+    keys = ["--config", f"cases={cases}", f"views={views}", f"results={results}"]
+    command = [sys.executable, "-m", "snakemake", "--cores", "2", "--quiet", "all", str(results / case / "localize.h5")]
+    start = time.perf_counter()
+    subprocess.run([*command, *keys], cwd=PROJECT, check=True)
+    return time.perf_counter() - start
+
+
+def rows(folder: Path) -> list[tuple[str, float, float, float]]:
+    """Stage, wall time in s, processor time in s and largest resident memory in MB of every job."""
+    found = []
+    for path in sorted(folder.glob("**/*.tsv"), key=lambda path: path.stat().st_mtime):
+        with path.open(newline="") as file:
+            row = next(csv.DictReader(file, delimiter="\t"))
+        numbers = (float(row[key]) if row[key] not in ("-", "NA") else 0.0 for key in ("s", "cpu_time", "max_rss"))
+        found.append((path.stem, *numbers))
+    return found
+
+
+def main(arguments: list[str]) -> None:
+    if not arguments:
+        subprocess.run(
+            [sys.executable, "-m", "snakemake", "--cores", "2", "--quiet", "all", "--until", "segment"],
+            cwd=PROJECT,
+            check=True,
+        )
+    cases, views = arguments[:2] or EMBEDDED
+    case = arguments[2] if len(arguments) > 2 else first_two_view_case(Path(views))
+    with tempfile.TemporaryDirectory() as folder:
+        wall = benchmark(cases, views, case, Path(folder))
+        found = rows(Path(folder) / "benchmarks")
+    print(f"{'stage':<16}{'wall s':>8}{'cpu s':>8}{'MB':>8}")
+    for name, *numbers in found:
+        print(f"{name:<16}" + "".join(f"{number:>8.1f}" for number in numbers))
+    print(f"{case}: {wall:.1f} s on 2 cores, at most {max(row[3] for row in found):.0f} MB a job")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

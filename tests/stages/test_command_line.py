@@ -1,0 +1,104 @@
+"""`python -m stages`: check, show and export, and errors without a traceback."""
+
+import nibabel
+import numpy as np
+import pytest
+
+from mammoreg.geometry import Volume
+from mammoreg.meshing.block import BlockMesh
+from stages.__main__ import main
+from stages.artefact import Array, Fields, VolumeField, write_artefact
+from tests.stages.cohort_files import write_cohort
+
+ATTRS = {
+    "stage": "mesh",
+    "schema": "1",
+    "case": "c1",
+    "view": "CC",
+    "laterality": "L",
+    "artefact_id": "x",
+    "package_version": "0.1.0",
+    "code": "0123456789abcdef",
+    "frame": "LPS, mm",
+    "settings": '{"elements":2}',
+    "row": "{}",
+    "inputs": '{"segment": ["x"]}',
+}
+
+
+@pytest.fixture
+def artefact(tmp_path):
+    grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), axis=-1).transpose(2, 1, 0, 3).reshape(-1, 3)
+    block = BlockMesh(2, 10 * grid)
+    volume = Volume(
+        np.arange(24, dtype=np.float32).reshape(2, 3, 4), np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 0.5])
+    )
+    fields = Fields(
+        arrays={
+            "points": Array(block.points, "mm", "node positions"),
+            "gland_fraction": Array(np.linspace(0, 1, 8), "1", "share of gland"),
+        },
+        volumes={"mr": VolumeField(volume, "1", "MR signal"), "updated/mr": VolumeField(volume, "1", "MR", "plate")},
+        values={"rows": [{"name": "P1", "x_mm": 1.5}, {"name": "P2", "x_mm": None}], "n": 2},
+    )
+    path = tmp_path / "mesh.h5"
+    write_artefact(path, ATTRS, fields)
+    return path
+
+
+def test_show_says_what_is_in_it(artefact, capsys):
+    assert main(["show", str(artefact)]) == 0
+    text = capsys.readouterr().out
+    for line in (
+        "mesh of c1 CC (L): ok",
+        'settings {"elements":2}',
+        "  points 27 x 3 mm, 0 to 20: node positions",
+        "  mr 2 x 3 x 4 1 (LPS): MR signal",
+        "  updated/mr 2 x 3 x 4 1 (plate): MR",
+        "  n = 2",
+    ):
+        assert line in text.splitlines()
+
+
+def test_export_writes_what_other_programs_open(artefact, tmp_path, capsys):
+    assert main(["export", str(artefact), "--to", str(tmp_path / "out")]) == 0
+    import meshio
+
+    mesh = meshio.read(tmp_path / "out" / "points.vtu")
+    assert mesh.cells[0].data.shape == (8, 8)
+    np.testing.assert_allclose(mesh.cell_data["gland_fraction"][0], np.linspace(0, 1, 8))
+    image = nibabel.load(tmp_path / "out" / "mr.nii")
+    # NIfTI's world is RAS: x and y of LPS change their sign.
+    np.testing.assert_allclose(image.affine @ [1, 2, 3, 1], [-2.0, -6.0, 4.5, 1.0])
+    assert image.get_fdata()[1, 2, 3] == 23
+    assert (tmp_path / "out" / "rows.csv").read_text() == "name,x_mm\nP1,1.5\nP2,\n"
+    assert (tmp_path / "out" / "updated.mr.nii").exists()
+
+
+def test_check_of_a_good_and_a_bad_cohort(tmp_path, capsys):
+    folder = write_cohort(tmp_path)
+    assert main(["check", str(folder / "cases.tsv"), str(folder / "views.tsv")]) == 0
+    assert capsys.readouterr().out == "1 cases and 1 mammograms, nothing to mend\n"
+    (folder / "mr.nii.gz").unlink()
+    assert main(["check", str(folder / "cases.tsv"), str(folder / "views.tsv")]) == 1
+    assert (
+        "1 fault found before the first job:\n  1. cases.tsv (c1), column mr: there is no file"
+        in capsys.readouterr().err
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["show", "no.h5"], "no.h5: not an artefact of this pipeline"),
+        (["run", "mash", "--out", "x.h5"], "no stage 'mash'; the stages are digital, segment"),
+        (["run", "mesh", "--in", "segment", "--out", "x.h5"], "'segment' is no pair; write name=value"),
+        (["run", "mesh", "--settings", "{elements: 7}", "--out", "x.h5"], "--settings is no JSON object"),
+    ],
+)
+def test_mistake_is_one_message(arguments, message, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 1
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
