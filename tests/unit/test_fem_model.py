@@ -23,7 +23,8 @@ def deformed(model: HyperelasticModel, seed: int = 1) -> Floats:
 
 
 def assembled(model: HyperelasticModel, blocks: Floats) -> Floats:
-    return np.bincount(model.dofs.ravel(), weights=blocks.ravel(), minlength=model.points.size)
+    sums = np.bincount(model.dofs.ravel(), weights=blocks.ravel(), minlength=model.points.size)
+    return np.asarray(sums, dtype=float)
 
 
 def internal_force(model: HyperelasticModel, positions: Floats, pressure: Floats) -> Floats:

@@ -14,13 +14,12 @@ from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, SoftMemory, SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
-from mammoreg.fem.linear import linear_solver
 from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.sparse import Array, Assembler, Integers
+from mammoreg.fem.sparse import Array, Integers
+from mammoreg.fem.system import NewtonSystem, node_dofs
 from mammoreg.fem.ties import PlaneTies
 
 LEAST_DET_SHARE = 0.2  # a Newton step may shrink the smallest det F to this share of itself
-LEAST_STEP = 0.05
 RUNAWAY_MM = 200.0
 ITERATIONS = 14
 
@@ -64,19 +63,18 @@ class DampedEquilibrium:
         self.total = 3 * count + 1
         self.held = np.zeros((count, 3), dtype=bool)
         self.held[back.nodes] = back.held
-        self.free: Integers = np.flatnonzero(np.append(~self.held.ravel(), free_height))
-        self.groups = self._groups()
-        self.assembler = Assembler(self.groups, self.free, self.total, symmetric=True)
-        self.solver = linear_solver(self.assembler.indptr, self.assembler.indices, True)
+        free: Integers = np.flatnonzero(np.append(~self.held.ravel(), free_height))
+        self.system = NewtonSystem(model, self._groups(), free, self.total)
         self.weight = self._weight()
         self.iterations, self.residuals = 0, list[float]()
 
     def _groups(self) -> list[Integers]:
-        faces = _dofs(self.contact.surface.quads)
+        """Degrees of freedom of springs, contact, damping and ties."""
+        faces = node_dofs(self.contact.surface.quads)
         with_height = np.hstack([faces, np.full((len(faces), 1), self.total - 1)])
         every = np.arange(self.total)[:, None]
-        groups = [self.model.dofs, _dofs(self.back.nodes[:, None]), with_height, every]
-        return groups if self.ties is None else [*groups, _dofs(self.ties.nodes)]
+        groups = [node_dofs(self.back.nodes[:, None]), with_height, every]
+        return groups if self.ties is None else [*groups, node_dofs(self.ties.nodes)]
 
     def _weight(self) -> Array:
         """Damping (total,) per unit of the damping factor, mN/mm: mu times the node's share of volume over h^2."""
@@ -137,43 +135,21 @@ class DampedEquilibrium:
         if self.ties is not None:
             vectors.append(self.ties.force(state.positions))
             blocks.append(self.ties.blocks())
-        residual = self._sum(vectors)
-        scale = float(np.linalg.norm(self._sum([np.abs(v) for v in vectors])))
-        self.residuals.append(float(np.linalg.norm(residual[self.free])) / max(scale, 1e-12))
-        rate = self.model.bulk_per_volume
-        correction = (rate * internal.volume)[:, None] * internal.coupling
-        residual += np.bincount(self.model.dofs.ravel(), weights=correction.ravel(), minlength=self.total)
-        update = np.zeros(self.total)
-        update[self.free] = self.solver.solve(self.assembler.values(blocks), -residual[self.free])
+        self.residuals.append(self.system.unbalance(vectors))
         self.iterations += 1
-        along = np.einsum("ei,ei->e", internal.coupling, update[self.model.dofs])
-        return update, np.asarray(rate * (internal.volume + along))
-
-    def _sum(self, vectors: list[Array]) -> Array:
-        index = np.concatenate([group.ravel() for group in self.groups])
-        return np.bincount(index, weights=np.concatenate([v.ravel() for v in vectors]), minlength=self.total)
+        return self.system.increment(internal, vectors, blocks)
 
     def _moved(self, state: DampedState, update: Array, pressure: Array) -> tuple[DampedState, float]:
-        """The state after an update, halved until no element collapses, and the largest displacement."""
+        """The state after an update, halved until no element collapses, and how far the whole update would go."""
         largest = float(np.abs(update).max())
-        if not np.isfinite(largest) or largest > RUNAWAY_MM:
+        if largest > RUNAWAY_MM:
             raise NotConvergedError("the Newton iteration runs away")
-        motion = update[:-1].reshape(-1, 3)
-        least = LEAST_DET_SHARE * self.model.determinants(state.positions).min()
-        share = 1.0
-        while self.model.determinants(state.positions + share * motion).min() < least:
-            share *= 0.5
-            if share < LEAST_STEP:
-                raise NotConvergedError("an element turns inside out")
+        share = self.system.admissible(state.positions, update, LEAST_DET_SHARE)
         moved = replace(
             state,
-            positions=state.positions + share * motion,
+            positions=state.positions + share * update[:-1].reshape(-1, 3),
             pressure=state.pressure + share * pressure,
             height=state.height + share * float(update[-1]),
         )
-        return moved, share * largest
+        return moved, largest
 
-
-def _dofs(nodes: Integers) -> Integers:
-    """Degrees of freedom (M, 3 k) of nodes (M, k)."""
-    return np.asarray((3 * np.asarray(nodes)[:, :, None] + np.arange(3)).reshape(len(nodes), -1))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import Array, BackCondition
-from mammoreg.fem.equilibrium import Equilibrium, Load, NewtonOptions, Record, State
+from mammoreg.fem.equilibrium import Equilibrium, NewtonOptions, State
 from mammoreg.fem.model import HyperelasticModel
 
 
@@ -34,7 +34,8 @@ class PrescribedResult:
     Attributes:
         deformed: nodes (N, 3), mm.
         pressure: element pressures (E,), kPa, positive in tension.
-        iterations, steps, cuts, residuals: as in `CompressionResult`.
+        iterations, steps, cuts: Newton iterations, load steps that converged, and those that were halved.
+        residuals: ratio of unbalanced to internal forces, each iteration.
         energy_mj: isochoric strain energy, mJ.
         min_det_f: smallest det F at a Gauss point.
         volume_change: relative change of the whole volume.
@@ -81,34 +82,31 @@ def solve_prescribed(
     origin = model.points if start is None else np.asarray(start, dtype=float)
     state = State(origin, np.zeros(len(model.hexes)) if pressure is None else pressure)
     equilibrium = Equilibrium(model, held, back)
-    anchors = model.points + (0.0 if back is None else back.pull_mm)
-    record, done, step, steps, cuts = Record(), 0.0, options.first_step, 0, 0
+    done, step, steps, cuts = 0.0, options.first_step, 0, 0
     while done < 1.0:
         share = min(1.0, done + step)
-        load = Load((), origin + share * (goal - origin), anchors)
-        before = len(record.residuals)
+        before = len(equilibrium.residuals)
         try:
-            state = equilibrium.solve(state, load, options.newton, record)
+            state = equilibrium.solve(state, origin + share * (goal - origin), options.newton)
         except NotConvergedError as error:
             cuts, step = cuts + 1, 0.5 * step
             if step < options.least_step:
                 raise NotConvergedError(f"{error}; the prescribed nodes came {done:.0%} of their way") from error
             continue
         done, steps = share, steps + 1
-        if len(record.residuals) - before <= options.easy_iterations:
+        if len(equilibrium.residuals) - before <= options.easy_iterations:
             step *= 2.0
-    forces = equilibrium.forces(state, Load((), goal, anchors))
     return PrescribedResult(
         deformed=state.positions,
         pressure=state.pressure,
-        iterations=len(record.residuals),
+        iterations=len(equilibrium.residuals),
         steps=steps,
         cuts=cuts,
-        residuals=record.residuals,
+        residuals=equilibrium.residuals,
         energy_mj=model.energy_mj(state.positions),
         min_det_f=float(model.determinants(state.positions).min()),
         volume_change=model.volume_change(state.positions),
-        reaction_n=1e-3 * forces.residual[:-1].reshape(-1, 3)[nodes].sum(axis=0),
+        reaction_n=1e-3 * equilibrium.reaction(state)[nodes].sum(axis=0),
     )
 
 
