@@ -114,6 +114,17 @@ def test_thickness_of_one_view_reruns_that_view_only(finished):
     assert "b CC: pose" not in output
 
 
+def test_dropping_marks_reruns_nothing_before_localize(finished):
+    project, cohort, _ = finished
+    table = cohort / "cases.tsv"
+    text = table.read_text()
+    table.write_text(text.replace("a.nii.gz\tpoints.tsv", "a.nii.gz\t"))
+    output = snakemake(project, *_keys(cohort), "-n").stdout
+    table.write_text(text)
+    assert _jobs(output) == ["complete", "evaluate", "figures", "localize", "report", "tables"]
+    assert "b: localize" not in output
+
+
 def test_one_case_and_one_stage(finished):
     project, cohort, _ = finished
     one = snakemake(project, "-n", "--forceall", "my results/a/localize.h5", *_keys(cohort)).stdout

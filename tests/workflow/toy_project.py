@@ -89,11 +89,13 @@ def make_cohort(folder: Path, cases: tuple[str, ...] = ("a", "b", "c")) -> Path:
     """Tables and small files of a cohort: each case an MR volume and a CC and MLO picture."""
     folder.mkdir(parents=True)
     rng = np.random.default_rng(1)
-    case_lines, view_lines = ["case\tlaterality\tmr"], ["case\tview\timage\tpixel_spacing_mm\tthickness_mm"]
+    case_lines = ["case\tlaterality\tmr\tmr_landmarks"]
+    view_lines = ["case\tview\timage\tpixel_spacing_mm\tthickness_mm"]
+    (folder / "points.tsv").write_text("name\tx\ty\tz\nP1\t1\t2\t3\n")
     for case in cases:
         volume = rng.normal(size=(10, 11, 12)).astype(np.float32)
         nibabel.save(nibabel.Nifti1Image(volume, np.diag([1.4, 1.4, 1.4, 1.0])), folder / f"{case}.nii.gz")
-        case_lines.append(f"{case}\tR\t{case}.nii.gz")
+        case_lines.append(f"{case}\tR\t{case}.nii.gz\tpoints.tsv")
         for view in ("CC", "MLO"):
             Image.fromarray(rng.integers(0, 255, (30, 20), dtype=np.uint8)).save(folder / f"{case}_{view}.png")
             view_lines.append(f"{case}\t{view}\t{case}_{view}.png\t0.2\t50")
