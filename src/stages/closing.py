@@ -22,8 +22,14 @@ def placed_breast(mesh: Artefact, angle_deg: float, mechanics: Mechanics, mu_kpa
     return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland)
 
 
-def closing_plates(breast: PlacedBreast, edge_p_mm: float, mechanics: Mechanics, options: ClosingOptions) -> Closing:
-    """Plates around a placed breast."""
+def closing_plates(
+    breast: PlacedBreast,
+    edge_p_mm: float,
+    mechanics: Mechanics,
+    options: ClosingOptions,
+    lower_mm: float | None = None,
+) -> Closing:
+    """Plates around a placed breast; `lower_mm` is the lower plate's height where a second volume shows it."""
     return Closing(
         breast.model,
         breast.skin_quads,
@@ -32,6 +38,7 @@ def closing_plates(breast: PlacedBreast, edge_p_mm: float, mechanics: Mechanics,
         mechanics.lip_radius_mm,
         mechanics.friction,
         options,
+        lower_mm,
     )
 
 
@@ -60,7 +67,7 @@ def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closi
     mechanics = Mechanics.model_validate(compress.value("mechanics"))
     options = replace(ClosingOptions(), **_options(compress.value("options")))
     breast = placed_breast(mesh, compress.value("angle_deg"), mechanics, compress.value("mu_kpa"))
-    closing = closing_plates(breast, edge_p_mm, mechanics, options)
+    closing = closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))
     lift = np.array([0.0, 0.0, compress.value("lift_mm")])
     memory = SoftMemory(**{name: compress.array(f"contact/{name}", units) for name, units in _MEMORY.items()})
     positions = compress.array("deformed", "mm") - lift

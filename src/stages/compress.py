@@ -25,7 +25,9 @@ class Settings(SettingsModel):
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Close the plates to the thickness of the pose."""
-    view = view_geometry(inputs.artefact("pose"))
+    pose = inputs.artefact("pose")
+    view = view_geometry(pose)
+    lower_mm = view.height_mm if pose.value("plates_known") else None
     mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
     options = replace(
         ClosingOptions(),
@@ -34,7 +36,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         penalty_per_mm=settings.penalty_per_mm,
     )
     breast = placed_breast(inputs.artefact("mesh"), view.angle_deg, settings.mechanics, mu_kpa)
-    closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options)
+    closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options, lower_mm)
     closed = closing.close(view.thickness_mm)
     # The floating breast is placed where the pose has seen the plates.
     lift_mm = view.height_mm - closed.height_mm
@@ -49,6 +51,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             **solve_report(closed),
             "height_mm": view.height_mm,
             "lift_mm": lift_mm,
+            "known_lower_mm": lower_mm,
             "raised_mm": closed.state.height,
             "uncompressed_mm": closing.uncompressed_mm,
             **kept_values(settings.mechanics, options, mu_kpa, view.angle_deg),

@@ -25,7 +25,12 @@ class Mechanics(SettingsModel):
         1.0, ge=0.1, le=1000.0, description="shear modulus of gland over fat; 1 is the paper's homogeneous tissue"
     )
     fibre_ratio: float = Field(
-        0.0, ge=0.0, le=20.0, description="stiffness along the nipple axis in tension over the shear modulus; 0 is none"
+        1.0,
+        ge=0.0,
+        le=20.0,
+        description="stiffness along the nipple axis in tension over the shear modulus (the paper's macroscopic "
+        "anisotropy); "
+        "1 is an order of magnitude, not a fit, and 0 the paper's isotropic tissue",
     )
     friction: float = Field(
         0.46,
@@ -39,10 +44,16 @@ class Mechanics(SettingsModel):
     )
     back: Literal["fixed", "slide_compression", "slide_plane", "springs"] = Field(
         "slide_compression",
-        description="chest-wall side of the breast: fixed; slide_compression, free along the plates' direction only; "
-        "slide_plane, free in its own surface; springs, in its surface on springs",
+        description="chest-wall side of the breast: fixed; slide_compression, against the shear of "
+        "the tissue behind it along the plates' direction only; "
+        "slide_plane, free in its own surface; springs, in its surface against that shear",
     )
-    back_kpa_per_mm: float = Field(0.05, ge=0.0, le=10.0, description="stiffness of back `springs`, kPa/mm")
+    back_layer_mm: float = Field(
+        35.0,
+        gt=0.0,
+        le=1000.0,
+        description="soft tissue between the model's back and the chest wall, which shears as the back slides, mm",
+    )
 
 
 @dataclass(frozen=True)
@@ -82,7 +93,8 @@ def place_breast(
         fibre, fibre_kpa = _nipple_axis(mesh, angle_deg), mechanics.fibre_ratio * mu_kpa
     material = neo_hookean(mu, mechanics.poisson_ratio, fibre, fibre_kpa)
     model = HyperelasticModel(points, mesh.hexes(), material)
-    back = back_condition(mechanics.back, points, mesh.back_quads(), mechanics.back_kpa_per_mm)
+    shear = mu_kpa / mechanics.back_layer_mm
+    back = back_condition(mechanics.back, points, mesh.back_quads(), shear, along_kpa_per_mm=shear)
     return PlacedBreast(model, back, mesh.skin_quads())
 
 

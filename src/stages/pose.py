@@ -26,12 +26,10 @@ class Settings(SettingsModel):
     """Search for the pose with a coarse compression."""
 
     mechanics: Mechanics = Field(Mechanics(), description="tissue, plates and back of the coarse compression")
-    angle_offsets_deg: tuple[float, ...] = Field(
-        (-8.0, -4.0, 0.0, 4.0, 8.0),
-        min_length=1,
-        max_length=31,
-        description="angles to try around the header's, degrees",
+    angle_step_deg: float = Field(
+        4.0, ge=0.0, le=20.0, description="distance of the angles tried, degrees; 0 keeps the header's angle"
     )
+    angle_bound_deg: float = Field(16.0, gt=0.0, le=45.0, description="largest offset from the header's angle, degrees")
     angle_sd_deg: float = Field(5.0, gt=0.0, le=30.0, description="standard deviation of the header's angle, degrees")
     use_density: bool = Field(True, description="let dense tissue judge the angle beside the outline")
     thickness_shares: tuple[float, float] = Field(
@@ -60,7 +58,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     found = _estimate(seen, mesh, start, settings, mu_kpa, tissue)
     if found is None:
         raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
-    flags = _angle_flags(found, start, settings)
+    flags = _angle_flags(found)
     return _fields(seen, mesh, nipple, start, found.view, _search_values(found), estimated, flags)
 
 
@@ -82,17 +80,22 @@ def _estimate(
         return Compressed(closed.deformed, closed.height_mm)
 
     facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
-    offsets, sd = settings.angle_offsets_deg, settings.angle_sd_deg
-    return estimate_pose(start, seen.outline, compress, facets, offsets, sd, tissue, seen.density)
-
-
-def _angle_flags(found: PoseEstimate, start: ViewGeometry, settings: Settings) -> tuple[str, ...]:
-    offset = found.view.angle_deg - start.angle_deg
-    bounds = min(settings.angle_offsets_deg), max(settings.angle_offsets_deg)
-    at_bound = len(settings.angle_offsets_deg) > 1 and (offset <= bounds[0] + 0.1 or offset >= bounds[1] - 0.1)
-    return tuple(
-        text for text, holds in ((ANGLE_AT_BOUND, at_bound), (ANGLE_FROM_HEADER, not found.determined)) if holds
+    return estimate_pose(
+        start,
+        seen.outline,
+        compress,
+        facets,
+        settings.angle_step_deg,
+        settings.angle_bound_deg,
+        settings.angle_sd_deg,
+        tissue,
+        seen.density,
     )
+
+
+def _angle_flags(found: PoseEstimate) -> tuple[str, ...]:
+    doubts = ((ANGLE_AT_BOUND, found.at_bound), (ANGLE_FROM_HEADER, not found.determined))
+    return tuple(text for text, holds in doubts if holds)
 
 
 def _search_values(found: PoseEstimate) -> dict[str, Value]:
@@ -126,6 +129,7 @@ def _fields(
     arrays: dict[str, Array] = {**seen.arrays, **affine_arrays(mesh, start, view, seen)}
     values: dict[str, Value] = {
         **seen.values,
+        "plates_known": seen.placed,
         "angle_deg": view.angle_deg,
         "header_angle_deg": seen.geometry.angle_deg,
         "edge_p_mm": view.edge_p_mm,

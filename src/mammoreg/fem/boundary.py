@@ -51,6 +51,7 @@ def back_condition(
     quads: NDArray[np.integer],
     tangential_kpa_per_mm: float = 0.05,
     pull_mm: Array | None = None,
+    along_kpa_per_mm: float = 0.0,
 ) -> BackCondition:
     """The back condition of a setting.
 
@@ -61,12 +62,17 @@ def back_condition(
         quads: faces (F, 4) of the back.
         tangential_kpa_per_mm: stiffness of `springs` per area.
         pull_mm: displacement (3,) imposed on the back.
+        along_kpa_per_mm: stiffness per area against the sliding of `slide_compression`: the shear of the soft tissue
+            between the model's back and the chest wall.
     """
     nodes = np.unique(quads)
     if name == "fixed":
         return held_back(nodes, np.array([True, True, True]), pull_mm)
     if name == "slide_compression":
-        return held_back(nodes, np.array([True, True, False]), pull_mm)
+        held = held_back(nodes, np.array([True, True, False]), pull_mm)
+        area = np.linalg.norm(_node_areas(points, np.asarray(quads, dtype=np.int64))[nodes], axis=1)
+        held.springs[:, 2, 2] = along_kpa_per_mm * area
+        return held
     tangential = tangential_kpa_per_mm if name == "springs" else RESIDUAL_STIFFNESS_KPA_PER_MM
     springs = _springs(points, np.asarray(quads, dtype=np.int64), nodes, tangential)
     pull = np.zeros(3) if pull_mm is None else np.asarray(pull_mm, dtype=float)
@@ -75,12 +81,18 @@ def back_condition(
 
 def _springs(points: Array, quads: Integers, nodes: Integers, tangential: float) -> Array:
     """Stiffness (B, 3, 3) in mN/mm: stiff along the nodes' normals, `tangential` across, times their share of area."""
-    corners = points[quads]
-    face = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    area = np.zeros((len(points), 3))
-    np.add.at(area, quads.ravel(), np.repeat(0.25 * face, 4, axis=0))
+    area = _node_areas(points, quads)
     size = np.linalg.norm(area[nodes], axis=1)
     normal = area[nodes] / size[:, None]
     dyad = normal[:, :, None] * normal[:, None, :]
     across = tangential * (np.eye(3) - dyad)
     return np.asarray(size[:, None, None] * (NORMAL_STIFFNESS_KPA_PER_MM * dyad + across))
+
+
+def _node_areas(points: Array, quads: Integers) -> Array:
+    """Each node's share of the faces' area vectors (N, 3), mm2."""
+    corners = points[quads]
+    face = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    area = np.zeros((len(points), 3))
+    np.add.at(area, quads.ravel(), np.repeat(0.25 * face, 4, axis=0))
+    return area

@@ -99,6 +99,8 @@ class Closing:
         lip_radius_mm: radius of their lips there.
         friction: Coulomb coefficient between skin and plates.
         options: numerical settings.
+        lower_mm: height of the lower plate's face in the end, where it is known; else the plates' common height
+            floats, so that the back carries no net force along the compression.
     """
 
     def __init__(
@@ -110,8 +112,10 @@ class Closing:
         lip_radius_mm: float = 5.0,
         friction: float = 0.0,
         options: ClosingOptions | None = None,
+        lower_mm: float | None = None,
     ) -> None:
         self.model, self.back, self.edge, self.lip = model, back, edge_p_mm, lip_radius_mm
+        self.lower_mm = lower_mm
         self.options = options if options is not None else ClosingOptions()
         mu = float(np.average(model.material.mu_kpa, weights=model.volume))
         surface = ContactSurface(model.points, skin_quads, self.options.rule)
@@ -125,13 +129,17 @@ class Closing:
         """Height of the part between the plates before compression: the gap at which both touch."""
         return self.high - self.low
 
-    def plates(self, gap_mm: float) -> tuple[Plate, Plate]:
-        """Plates around the middle of first touch; the breast's floating height is counted from there."""
-        return plate_pair(gap_mm, 0.5 * (self.low + self.high), self.edge, self.lip)
+    def plates(self, gap_mm: float, share: float = 1.0) -> tuple[Plate, Plate]:
+        """Plates at a share of their way: around the middle of first touch, or on the way to their known height."""
+        middle = 0.5 * (self.low + self.high)
+        if self.lower_mm is not None:
+            middle += share * (self.lower_mm + 0.5 * gap_mm - middle)
+        return plate_pair(gap_mm, middle, self.edge, self.lip)
 
     def equilibrium(self, ties: PlaneTies | None = None) -> DampedEquilibrium:
         """The equations, with or without an outline that draws on the skin."""
-        return DampedEquilibrium(self.model, self.back, self.contact, free_height=self.back.holds_height, ties=ties)
+        floats = self.back.holds_height and self.lower_mm is None
+        return DampedEquilibrium(self.model, self.back, self.contact, free_height=floats, ties=ties)
 
     def close(self, gap_mm: float) -> Closed:
         """Close the plates from first touch to a gap and let the breast come to rest.
@@ -145,7 +153,7 @@ class Closing:
             )
         equilibrium = self.equilibrium()
         points = self.model.points
-        memory = self.contact.start(points, self.plates(self.uncompressed_mm), 0.0)
+        memory = self.contact.start(points, self.plates(self.uncompressed_mm, 0.0), 0.0)
         state = DampedState(points, np.zeros(len(self.model.hexes)), 0.0, memory)
         done, last, taken, cuts = 0.0, self.uncompressed_mm, 0, 0
         step = 1.0 / self.options.steps
@@ -180,7 +188,7 @@ class Closing:
     def _advance(
         self, equilibrium: DampedEquilibrium, state: DampedState, last: float, gap: float, share: float
     ) -> DampedState:
-        plates, anchors = self.plates(gap), self._anchors(share)
+        plates, anchors = self.plates(gap, share), self._anchors(share)
         guess = self.predictor.predict(state.positions, state.height, plates, gap / last)
         if self.model.determinants(guess).min() < LEAST_GUESS_DET:
             guess = state.positions

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
@@ -19,11 +18,12 @@ from mammoreg.pose.alignment import Alignment, align
 from mammoreg.pose.density import DensityImage, correlation, projected_structure
 from mammoreg.pose.outline import RadialOutline
 
-OUTLINE_SD_MM = 2.0  # what a homogeneous model leaves of an outline at the right angle
 OUTLINE_SAMPLES = 6.0  # independent pieces of information along an outline
+OUTLINE_FLOOR_MM = 1.0  # no model meets an outline better than this for its angle alone
 PATCH_MM = 14.0  # width of an independent patch of dense tissue
 DETERMINED_SHARE = 0.5  # the data must carry at least this share of the angle's information
 ANGLE_STEP_DEG = 0.25
+AT_BOUND_DEG = 0.5
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,7 @@ class PoseEstimate:
         view: geometry with angle, edge, middle and height estimated.
         alignment: silhouette of the coarse model against the outline at that pose.
         determined: whether the image, not the header, decided the angle.
+        at_bound: whether the angle ended at the bound of the search.
         angle_sd_deg: its standard deviation by the local curvature of the misfit.
         candidates: the angles tried.
     """
@@ -75,6 +76,7 @@ class PoseEstimate:
     view: ViewGeometry
     alignment: Alignment
     determined: bool
+    at_bound: bool
     angle_sd_deg: float
     candidates: tuple[Candidate, ...]
 
@@ -84,19 +86,24 @@ def estimate_pose(
     outline: RadialOutline,
     compress: Callable[[ViewGeometry], Compressed | None],
     facets: SkinFacets,
-    offsets_deg: Sequence[float],
+    step_deg: float,
+    bound_deg: float,
     prior_sd_deg: float,
     tissue: Tissue | None = None,
     mammogram: DensityImage | None = None,
 ) -> PoseEstimate | None:
     """Estimate the pose around a start (header's angle, edge and middle of the scaled breast).
 
+    Angles are tried a step apart, from the header's outwards until the least misfit is bracketed; then the edge and
+    the middle are refined at the best one.
+
     Args:
         view: start; its angle is the prior's mean.
         outline: the mammogram's outline.
         compress: coarse compression at a view's angle, edge and thickness; None where it does not converge.
         facets: skin of the coarse mesh.
-        offsets_deg: angles to try, relative to the header's, increasing; a single one keeps the angle.
+        step_deg: distance of the angles tried; zero keeps the header's.
+        bound_deg: largest offset from the header's angle.
         prior_sd_deg: standard deviation of the prior.
         tissue, mammogram: dense tissue of model and image; without them the outline decides alone.
 
@@ -104,33 +111,60 @@ def estimate_pose(
         The estimate, or None where no compression converged.
     """
 
-    def judge(angle_deg: float, start: ViewGeometry) -> Candidate | None:
-        at = replace(start, angle_deg=angle_deg)
+    def judge(offset_deg: float, start: ViewGeometry) -> Candidate | None:
+        at = replace(start, angle_deg=view.angle_deg + offset_deg)
         compressed = compress(at)
         if compressed is None:
             return None
         at = replace(at, height_mm=compressed.height_mm)
         state = align(facets.positions(compressed.nodes), facets.quads, at, outline)
         ncc, patches = _density(compressed.nodes, state.view, tissue, mammogram)
-        offset = (angle_deg - view.angle_deg) / prior_sd_deg
-        misfit = OUTLINE_SAMPLES * (state.rms_mm / OUTLINE_SD_MM) ** 2 + offset**2
-        return Candidate(angle_deg, state, ncc, misfit + patches * np.log(max(1.0 - max(ncc, 0.0) ** 2, 1e-3)))
+        misfit = _misfit(state.rms_mm, ncc, patches, offset_deg / prior_sd_deg)
+        return Candidate(at.angle_deg, state, ncc, misfit)
 
-    start = view
-    tried: list[Candidate] = []
-    for offset in sorted(offsets_deg, key=abs):
-        candidate = judge(view.angle_deg + offset, start)
-        if candidate is not None:
-            tried.append(candidate)
-            start = tried[0].alignment.view
+    first = judge(0.0, view)
+    # The plates' edge moves with the first alignment, and the compression with the edge.
+    start = view if first is None else first.alignment.view
+    tried = _bracketed(lambda offset: judge(offset, start), step_deg, bound_deg)
     if not tried:
         return None
-    tried.sort(key=lambda c: c.angle_deg)
-    best, sd = _best_angle(tried)
-    nearest = min(tried, key=lambda c: abs(c.angle_deg - best))
-    final = judge(best, nearest.alignment.view) or nearest
-    determined = len(tried) > 2 and 1.0 - (sd / prior_sd_deg) ** 2 >= DETERMINED_SHARE
-    return PoseEstimate(final.alignment.view, final.alignment, determined, sd, tuple(tried))
+    ordered = [tried[offset] for offset in sorted(tried)]
+    best, sd = _best_angle(ordered)
+    nearest = min(ordered, key=lambda c: abs(c.angle_deg - best))
+    final = judge(best - view.angle_deg, nearest.alignment.view) or nearest
+    determined = 1.0 - (sd / prior_sd_deg) ** 2 >= DETERMINED_SHARE
+    at_bound = abs(best - view.angle_deg) > bound_deg - AT_BOUND_DEG and step_deg > 0.0
+    return PoseEstimate(final.alignment.view, final.alignment, determined, at_bound, sd, tuple(ordered))
+
+
+def _bracketed(judge: Callable[[float], Candidate | None], step_deg: float, bound_deg: float) -> dict[float, Candidate]:
+    """Candidates by offset: around the header's angle, then outwards while the best one lies at an end."""
+    offsets = [0.0] if step_deg == 0.0 else [0.0, -step_deg, step_deg]
+    tried: dict[float, Candidate] = {}
+    while offsets:
+        for offset in offsets:
+            candidate = judge(offset)
+            if candidate is not None:
+                tried[offset] = candidate
+        if not tried or step_deg == 0.0:
+            break
+        best = min(tried, key=lambda o: tried[o].misfit)
+        ends = [best + side * step_deg for side in (-1.0, 1.0)]
+        known = (min(tried), max(tried))
+        offsets = [end for end in ends if abs(end) <= bound_deg and not known[0] <= end <= known[1]]
+        if len(tried) > 2 * bound_deg / step_deg + 1:
+            break
+    return tried
+
+
+def _misfit(rms_mm: float, ncc: float, patches: float, offset: float) -> float:
+    """Minus twice the log likelihood of outline and dense tissue, plus the prior.
+
+    The outline's error is the model's own and of unknown size, so its variance is profiled out.
+    """
+    by_outline = OUTLINE_SAMPLES * np.log(rms_mm**2 + OUTLINE_FLOOR_MM**2)
+    by_density = patches * np.log(1.0 - max(ncc, 0.0) ** 2)
+    return float(by_outline + by_density + offset**2)
 
 
 def _density(
@@ -153,7 +187,11 @@ def _best_angle(tried: Sequence[Candidate]) -> tuple[float, float]:
     misfits = np.array([c.misfit for c in tried])
     if len(tried) < 3:
         return float(angles[np.argmin(misfits)]), float("inf")
-    fine = np.arange(angles[0], angles[-1] + 1e-9, ANGLE_STEP_DEG)
-    best = float(fine[np.argmin(PchipInterpolator(angles, misfits)(fine))])
-    bend = float(np.polyfit(angles - best, misfits, 2)[0])
-    return best, float(1.0 / np.sqrt(bend)) if bend > 0 else float("inf")
+    middle = int(np.clip(np.argmin(misfits), 1, len(tried) - 2))
+    around = slice(middle - 1, middle + 2)
+    bend, slope, _ = np.polyfit(angles[around] - angles[middle], misfits[around], 2)
+    if bend <= 0.0:
+        return float(angles[np.argmin(misfits)]), float("inf")
+    low, high = angles[around][0], angles[around][-1]
+    best = float(np.clip(angles[middle] - 0.5 * slope / bend, low, high))
+    return round(best / ANGLE_STEP_DEG) * ANGLE_STEP_DEG, float(1.0 / np.sqrt(bend))

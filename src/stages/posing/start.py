@@ -88,6 +88,7 @@ def without_image(mesh: BlockMesh, subject: Subject) -> Fields:
             "pixel_mm": 1.0,
             "rows": 400,
             "columns": 300,
+            "plates_known": False,
             "angle_determined": False,
             "estimated": ["angle_deg", "edge_p_mm", "thickness_mm"],
             "flags": [],

@@ -1,7 +1,5 @@
 """Dense tissue of the MR volume, tied to the mesh, for the comparison with a mammogram."""
 
-import numpy as np
-
 from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.locate import Locator
