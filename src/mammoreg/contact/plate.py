@@ -24,7 +24,6 @@ class Gap:
     distance: Array
     normal: Array
     curvature: Array
-    flat: NDArray[np.bool_]
 
     def hessian(self) -> Array:
         """Second derivative of the distance (..., 3, 3), 1/mm."""
@@ -63,7 +62,7 @@ class Plate:
         normal[..., 1] = np.where(rounded, across / safe, wall)
         normal[..., 2] = self.facing * np.where(rounded, above / safe, ~wall)
         distance = np.where(rounded, length, np.maximum(across, above)) - radius
-        return Gap(distance, normal, np.where(rounded, 1.0 / safe, 0.0), ~rounded & ~wall)
+        return Gap(distance, normal, np.where(rounded, 1.0 / safe, 0.0))
 
     def first_touch(self, points: Array) -> float:
         """Height, mm, of the face at which the plate, coming from afar, first touches one of the points (N, 3)."""

@@ -4,7 +4,7 @@ For patients, where convergence matters more than the last tenth of a millimetre
 is zero beyond a band above the plate, quadratic within it and linear below, so its derivative is continuous. Friction
 takes its limit from the pressure of the last converged step: then both have potentials, the tangent is symmetric and
 Newton's method does not chatter between sticking and slipping. Terms are per face with the plates' common height as
-13th degree of freedom, as in `contact.augmented`.
+13th degree of freedom.
 """
 
 from collections.abc import Sequence

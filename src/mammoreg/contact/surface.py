@@ -7,12 +7,11 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-Rule = Literal["nodes", "simpson", "lobatto4", "gauss2", "gauss3"]
+Rule = Literal["nodes", "simpson", "gauss2", "gauss3"]
 
 _LINE_RULES: dict[str, tuple[Array, Array]] = {
     "nodes": (np.array([-1.0, 1.0]), np.array([1.0, 1.0])),
     "simpson": (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3.0),
-    "lobatto4": (np.array([-1.0, -(0.2**0.5), 0.2**0.5, 1.0]), np.array([1.0, 5.0, 5.0, 1.0]) / 6.0),
     "gauss2": (np.array([-1.0, 1.0]) / 3.0**0.5, np.array([1.0, 1.0])),
     "gauss3": (np.array([-(0.6**0.5), 0.0, 0.6**0.5]), np.array([5.0, 8.0, 5.0]) / 9.0),
 }
@@ -24,7 +23,7 @@ class ContactSurface:
     Args:
         points: undeformed nodes (N, 3), mm.
         quads: corners of the faces (F, 4), cyclic.
-        rule: points per face; the closed rules (nodes, simpson, lobatto4) hold the corners too.
+        rule: points per face; the closed rules (nodes, simpson) hold the corners too.
 
     Attributes:
         shape: shape functions at the points of a face, (q, 4).

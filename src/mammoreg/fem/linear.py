@@ -52,11 +52,6 @@ class PardisoSolver:
         self._call(_FACTORISE, values, rhs)
         return self._call(_SOLVE, values, rhs)
 
-    @property
-    def negative_eigenvalues(self) -> int | None:
-        """Of the last factorised matrix, if symmetric: more than zero marks an unstable equilibrium."""
-        return int(self._iparm[22]) if self._type == _SYMMETRIC_INDEFINITE else None
-
     def _call(self, phase: int, values: Array, rhs: Array) -> Array:
         solution = np.zeros(self._size)
         error = _pardiso(
@@ -98,8 +93,6 @@ def _release(handle: NDArray[np.int64], kind: int, size: int, iparm: Indices) ->
 
 class SuperLuSolver:
     """SciPy's SuperLU with the interface of `PardisoSolver`; slower."""
-
-    negative_eigenvalues: int | None = None
 
     def __init__(self, indptr: Indices, indices: Indices, symmetric: bool) -> None:
         self._indptr, self._indices, self._symmetric = indptr, indices, symmetric

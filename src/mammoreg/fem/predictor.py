@@ -28,7 +28,9 @@ class AffinePredictor:
         low, high = lower.height_mm + height, upper.height_mm + height
         imaged = np.ones(len(positions))
         if lower.edge_p_mm is not None:
-            imaged = np.clip(1.0 - (positions[:, 1] - lower.edge_p_mm) / FADE_MM, 0.0, 1.0)
+            # Tissue bulges over the lips: pushing it back under the flat faces would undo the last step.
+            flat_end = lower.edge_p_mm - lower.lip_radius_mm
+            imaged = np.clip(1.0 - (positions[:, 1] - flat_end) / FADE_MM, 0.0, 1.0)
         squeeze = 1.0 + imaged * (ratio - 1.0)
         spread = 1.0 + self.reach * imaged * (ratio**-0.5 - 1.0)
         centre = positions.mean(axis=0)
