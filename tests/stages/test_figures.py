@@ -108,6 +108,13 @@ def test_the_deformed_volume_lies_where_the_deformation_carries_the_breast(case:
     np.testing.assert_allclose(world.std(axis=0), carried.std(axis=0), rtol=0.05)
 
 
+def test_itk_places_the_deformed_volume_like_nibabel(case: Case) -> None:
+    path = case[0] / "export" / "mr_CC_updated.nii.gz"
+    placed = np.array(SimpleITK.ReadImage(str(path)).TransformIndexToPhysicalPoint((5, 20, 10)))
+    expected = nibabel.affines.apply_affine(nibabel.load(path).affine, [5, 20, 10]) * [-1, -1, 1]
+    np.testing.assert_allclose(placed, expected, atol=1e-3)
+
+
 def test_meshes_are_right_handed_in_lps(case: Case) -> None:
     folder, _, laterality = case
     before = meshio.read(folder / "export" / "mesh.vtu")

@@ -1,11 +1,6 @@
 """Files of a case that other programs open (3D Slicer, ParaView), by name inside its folder `export`."""
 
-import gzip
-import io
-import itertools
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,11 +13,9 @@ from stages.artefact import Artefact
 from stages.marks import canonical_pixels
 from stages.methods import MESH_METHODS
 from stages.picturing.case import PicturedCase
-from stages.readers.mr_header import read_mr_grid
+from stages.picturing.file_formats import mask_png, mr_grid, nifti_bytes, on_grid, volume_affine, vtu_bytes
 
-_LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 _DISPLACEMENT_INTENT = 1006
-_COMPRESSION_LEVEL = 1
 _OUTSIDE_MM = 0.0
 README = """Research use only.
 
@@ -53,32 +46,6 @@ def case_exports(case: PicturedCase) -> dict[str, bytes]:
         files |= {f"mesh_{view}_{method}.vtu": _deformed_mesh(case, block, view, method) for method in methods}
     best = {view: methods[-1] for view, methods in solved.items() if methods}
     return files | _deformed_volumes(case, best) | _displacements(case, best)
-
-
-def nifti_bytes(data: NDArray[Any], affine_lps: NDArray[np.float64], intent: int = 0) -> bytes:
-    """A compressed NIfTI file without a clock in it.
-
-    Args:
-        data: samples, (nx, ny, nz) or (nx, ny, nz, 1, 3).
-        affine_lps: voxel index to LPS mm, (4, 4).
-        intent: NIfTI intent code.
-    """
-    import nibabel as nib
-
-    image = nib.Nifti1Image(data, _LPS_TO_RAS @ affine_lps)
-    image.header.set_xyzt_units("mm")
-    image.header.set_intent(intent)
-    packed = io.BytesIO()
-    with gzip.GzipFile(fileobj=packed, mode="wb", compresslevel=_COMPRESSION_LEVEL, mtime=0, filename="") as file:
-        file.write(image.to_bytes())
-    return packed.getvalue()
-
-
-def volume_affine(volume: Volume) -> NDArray[np.float64]:
-    """Voxel index to mm in the volume's own frame, (4, 4)."""
-    affine = np.diag([*volume.spacing, 1.0])
-    affine[:3, 3] = volume.origin
-    return affine
 
 
 def plate_to_lps_affine(angle_deg: float, laterality: Laterality) -> NDArray[np.float64]:
@@ -154,19 +121,6 @@ def lps_hexes(block: BlockMesh, laterality: Laterality) -> NDArray[np.int64]:
     return hexes if laterality == "R" else hexes[:, [1, 0, 3, 2, 5, 4, 7, 6]]
 
 
-def vtu_bytes(
-    points: Points, hexes: NDArray[Any], point_data: Mapping[str, Any], cell_data: Mapping[str, Any]
-) -> bytes:
-    """A hexahedral mesh as VTU, which ParaView and 3D Slicer open."""
-    import meshio
-
-    mesh = meshio.Mesh(points, [("hexahedron", hexes)], point_data=dict(point_data), cell_data=dict(cell_data))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "mesh.vtu"
-        mesh.write(path)
-        return path.read_bytes()
-
-
 def _lesion_names(case: PicturedCase) -> dict[str, bytes]:
     """Which lesion each number stands for."""
     marked = {"mr": case.mr_lesions, "mammograms": case.mammogram_lesions}
@@ -188,34 +142,6 @@ def _lesions_in_mr(case: PicturedCase) -> dict[str, bytes]:
                 mask = on_grid(region, shape, affine)
                 files[f"lesion_{number}_{method}_mr.nii.gz"] = nifti_bytes(mask, affine)
     return files
-
-
-def mr_grid(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
-    """Shape of the MR volume as the user gave it, and its affine (4, 4) from voxel index to LPS mm."""
-    grid = read_mr_grid(path)
-    steps = [(grid.corners[far] - grid.corners[0]) / (n - 1) for far, n in zip((4, 2, 1), grid.shape, strict=True)]
-    affine = np.eye(4)
-    affine[:3, :3], affine[:3, 3] = np.array(steps).T, grid.corners[0]
-    return grid.shape, affine
-
-
-def on_grid(mask: Volume, shape: tuple[int, ...], affine: NDArray[np.float64]) -> NDArray[np.uint8]:
-    """A mask at the voxels of another grid, by nearest neighbour.
-
-    Args:
-        mask: any grid, LPS.
-        shape: of the other grid.
-        affine: (4, 4) from its voxel indices to LPS mm.
-    """
-    found = np.zeros(shape, dtype=np.uint8)
-    ends = mask.to_world(np.array(list(itertools.product(*((-1, n) for n in mask.shape)))))
-    corners = (ends - affine[:3, 3]) @ np.linalg.inv(affine[:3, :3]).T
-    low = np.clip(np.floor(corners.min(axis=0)).astype(int), 0, shape)
-    high = np.clip(np.ceil(corners.max(axis=0)).astype(int) + 1, 0, shape)
-    index = np.stack(np.meshgrid(*map(np.arange, low, high), indexing="ij"), axis=-1)
-    places = index @ affine[:3, :3].T + affine[:3, 3]
-    found[tuple(slice(a, b) for a, b in zip(low, high, strict=True))] = mask.sample(places, order=0) > 0.5
-    return found
 
 
 def _lesions_in_mammograms(case: PicturedCase) -> dict[str, bytes]:
@@ -241,12 +167,3 @@ def stored_image(pose: Artefact, canonical: NDArray[Any]) -> NDArray[Any]:
     from_rows = canonical_pixels(pose, np.stack([np.zeros_like(rows), rows], axis=1))[:, 1]
     index = (np.rint(from_rows).astype(np.intp), np.rint(from_columns).astype(np.intp))
     return np.asarray(canonical[np.ix_(*(np.clip(i, 0, n - 1) for i, n in zip(index, canonical.shape, strict=True)))])
-
-
-def mask_png(mask: NDArray[Any]) -> bytes:
-    """A mask as a grey PNG: 255 inside, 0 outside."""
-    from PIL import Image
-
-    packed = io.BytesIO()
-    Image.fromarray(np.where(mask, 255, 0).astype(np.uint8)).save(packed, format="PNG")
-    return packed.getvalue()
