@@ -1,0 +1,1 @@
+"""Digital patients: a parametric breast, its compression by another mechanics, and the images made of it."""
