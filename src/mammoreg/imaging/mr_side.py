@@ -10,8 +10,12 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_body import Mask
 
-BREAST_PROMINENCE_MM = 15.0
-"""A ridge of the body lower than this is no breast."""
+HILL_MM = 15.0
+"""A hill of the body lower than this is no breast."""
+SMALLER_SHARE = 0.4
+"""Beside the highest hill, a lateral one of less than this share of its height is no breast but arm, fold or ghost."""
+WRONG_SIDE_MM = 30.0
+"""A breast that lies further than this beyond the patient's middle is the other one, if both sides are in view."""
 
 
 @dataclass(frozen=True)
@@ -26,25 +30,44 @@ def find_breast(body: Mask, grid: Volume) -> BreastPlace:
     """Find the breast of the wanted side in a coarse body mask of the breast frame.
 
     The body's anterior relief, seen along the superior axis, is one hill or two; of two, the wanted one is the lateral
-    one in this frame (smaller m), and the valley between them is the midline.
+    one in this frame (smaller m), and the valley next to it is the midline.
 
     Raises:
-        DataError: nothing protrudes by at least 15 mm.
+        DataError: nothing protrudes by at least 15 mm, or only the other breast does.
     """
     relief = _relief(body, grid)
     profile = ndimage.gaussian_filter1d(np.sort(relief, axis=1)[:, -3:].mean(axis=1), 1.5)
-    padded = np.concatenate([[profile.min()], profile, [profile.min()]])
-    peaks, properties = signal.find_peaks(padded, prominence=BREAST_PROMINENCE_MM)
+    low = [profile.min()]
+    peaks = signal.find_peaks(np.concatenate([low, profile, low]), prominence=HILL_MM)[0] - 1
     if peaks.size == 0:
         raise DataError("no breast found in the MR volume: nothing protrudes; check orientation and field of view")
-    best = np.sort(peaks[np.argsort(-properties["prominences"], kind="stable")[:2]]) - 1
-    wanted = int(best[0])
-    valley = int(best[0] + np.argmin(profile[best[0] : best[1] + 1])) if best.size == 2 else body.shape[0]
-    strip = relief[max(wanted - 3, 0) : wanted + 4]
-    row, s = np.unravel_index(int(np.argmax(ndimage.gaussian_filter(strip, 1.0))), strip.shape)
-    m = max(wanted - 3, 0) + int(row)
-    p = int(np.argmax(body[m, :, s]))
-    return BreastPlace(grid.to_world(np.array([m, p, s])), float(grid.origin[0] + valley * grid.spacing[0]))
+    m = grid.origin[0] + grid.spacing[0] * np.arange(grid.shape[0])
+    wanted = _wanted_hill(profile, m, peaks)
+    if m[wanted] > WRONG_SIDE_MM and m[0] < -2.0 * WRONG_SIDE_MM:
+        raise DataError("the only breast in the MR volume is on the other side: check laterality")
+    further = peaks[peaks > wanted]
+    end = int(further[0]) if further.size else wanted
+    valley = wanted + int(np.argmin(profile[wanted : end + 1])) if further.size else grid.shape[0]
+    return BreastPlace(_apex(relief, body, grid, wanted), float(grid.origin[0] + valley * grid.spacing[0]))
+
+
+def _wanted_hill(profile: NDArray[np.float64], m: NDArray[np.float64], peaks: NDArray[np.intp]) -> int:
+    """Index of the lateral breast among the peaks of the relief's profile along m."""
+    highest = int(peaks[np.argmax(profile[peaks])])
+    for peak in peaks[peaks < highest]:
+        saddle = profile[peak:highest].min()
+        if m[highest] > 0.0 or profile[peak] - saddle > SMALLER_SHARE * (profile[highest] - saddle):
+            return int(peak)
+    return highest
+
+
+def _apex(relief: NDArray[np.float64], body: Mask, grid: Volume, hill: int) -> NDArray[np.float64]:
+    """The most anterior point within a few voxels of a hill's ridge, mm."""
+    first = max(hill - 3, 0)
+    strip = ndimage.gaussian_filter(relief[first : hill + 4], 1.0)
+    row, s = np.unravel_index(int(np.argmax(strip)), strip.shape)
+    m = first + int(row)
+    return grid.to_world(np.array([m, int(np.argmax(body[m, :, s])), s]))
 
 
 def _relief(body: Mask, grid: Volume) -> NDArray[np.float64]:

@@ -25,18 +25,26 @@ def depth_below_skin(body: Mask, spacing: NDArray[np.float64]) -> NDArray[np.flo
 
 
 def is_fat_suppressed(intensity: NDArray[np.float32], depth: NDArray[np.float32], breast: Mask) -> bool:
-    """Tell from the image whether fat is dark: then the skin outshines the fat beneath it.
+    """Tell from the image whether fat is dark.
 
-    Without suppression the outermost 2 mm are darker than what follows, be the skin thick or only a partial volume.
+    In units of the contrast between the two classes of the interior (0 the dark, 1 the bright one): with suppression
+    the skin, which lies in the outer 4 mm, outshines the bright class, and the layer beneath, nearly always fat, is
+    dark; without it nothing outshines fat.
 
     Raises:
-        DataError: no skin or no fat beneath it in the breast.
+        DataError: the breast has no interior.
     """
-    skin = intensity[breast & (depth > 0.5) & (depth < 2.0)]
-    beneath = intensity[breast & (depth > 2.8) & (depth < 4.5)]
-    if skin.size == 0 or beneath.size == 0:
+    layers = [
+        intensity[breast & (depth > low) & (depth < high)] for low, high in ((0.3, 4.0), (3.5, 6.0), (5.0, np.inf))
+    ]
+    if min(layer.size for layer in layers) == 0:
         raise DataError("the breast is too small to tell skin from fat: check side and field of view")
-    return bool(np.median(skin) > np.median(beneath))
+    outer, beneath, interior = layers
+    samples = np.clip(interior, *np.percentile(interior, [2.0, 98.0]))
+    threshold = threshold_otsu(samples)
+    dark, bright = samples[samples <= threshold].mean(), samples[samples > threshold].mean()
+    skin, fat = (np.array([np.percentile(outer, 90.0), np.median(beneath)]) - dark) / max(bright - dark, 1e-9)
+    return bool(skin - 2.0 * fat > 0.4)
 
 
 def gland_threshold(samples: NDArray[np.float32], fat_suppressed: bool) -> float:
