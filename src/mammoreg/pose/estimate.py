@@ -139,21 +139,17 @@ def estimate_pose(
 
 def _bracketed(judge: Callable[[float], Candidate | None], step_deg: float, bound_deg: float) -> dict[float, Candidate]:
     """Candidates by offset: around the header's angle, then outwards while the best one lies at an end."""
-    offsets = [0.0] if step_deg == 0.0 else [0.0, -step_deg, step_deg]
     tried: dict[float, Candidate] = {}
+    attempted: set[float] = set()
+    offsets = [0.0] if step_deg == 0.0 else [0.0, -step_deg, step_deg]
     while offsets:
-        for offset in offsets:
-            candidate = judge(offset)
-            if candidate is not None:
-                tried[offset] = candidate
+        attempted.update(offsets)
+        tried |= {offset: found for offset in offsets if (found := judge(offset)) is not None}
         if not tried or step_deg == 0.0:
             break
         best = min(tried, key=lambda o: tried[o].misfit)
-        ends = [best + side * step_deg for side in (-1.0, 1.0)]
-        known = (min(tried), max(tried))
-        offsets = [end for end in ends if abs(end) <= bound_deg and not known[0] <= end <= known[1]]
-        if len(tried) > 2 * bound_deg / step_deg + 1:
-            break
+        ends = (best - step_deg, best + step_deg)
+        offsets = [end for end in ends if abs(end) <= bound_deg and end not in attempted]
     return tried
 
 

@@ -12,6 +12,7 @@ from mammoreg.pose.alignment import Alignment, align
 from mammoreg.pose.outline import RadialOutline
 
 EDGE_PASSES = 3
+SETTLED_MM = 1.0
 MIN_FRONT_NODES = 20
 
 
@@ -21,14 +22,12 @@ class Scaling:
 
     Attributes:
         matrix, offset: affine map (3, 3) and (3,) mm from the breast to the plate frame; det(matrix) = 1.
-        share_along: share in [0, 1] of the widening that goes along the chest wall, the rest goes forward.
         uncompressed_mm: height of the imaged part before compression.
         alignment: the view after alignment of the outlines.
     """
 
     matrix: NDArray[np.float64]
     offset: Points
-    share_along: float
     uncompressed_mm: float
     alignment: Alignment
 
@@ -36,7 +35,10 @@ class Scaling:
 def fit_scaling(
     skin: Points, quads: NDArray[np.intp], view: ViewGeometry, outline: RadialOutline, *, keep_height: bool = False
 ) -> Scaling:
-    """Scale the breast to the plate gap and distribute the widening as the outline asks.
+    """Scale the breast to the plate gap, widen it alike in both directions across, and bring it onto the outline.
+
+    The outline does not tell how the widening is shared between forward and along the chest wall, because the imaged
+    portion is unknown too; so it is shared alike.
 
     Args:
         skin: undeformed surface nodes (N, 3) in the breast frame, mm.
@@ -46,26 +48,16 @@ def fit_scaling(
         keep_height: the plates' height is known (second MR volume): the breast is moved to it, not the plates to it.
     """
     turned = breast_to_plate(skin, view.angle_deg)
-    share, aligned, low, high = 0.5, view, 0.0, 0.0
-    state: Alignment | None = None
+    heights = _imaged_heights(turned, view.edge_p_mm)
+    state = _aligned(turned, quads, view, outline, heights, keep_height)
     for _ in range(EDGE_PASSES):
-        low, high = _imaged_heights(turned, aligned.edge_p_mm)
-        at = aligned
-        found = minimize_scalar(
-            lambda s, at=at, low=low, high=high: _aligned(turned, quads, at, outline, s, low, high, keep_height).rms_mm,
-            bounds=(0.0, 1.0),
-            method="bounded",
-            options={"xatol": 0.02},
-        )
-        share = float(found.x)
-        state = _aligned(turned, quads, aligned, outline, share, low, high, keep_height)
-        moved = abs(state.view.edge_p_mm - aligned.edge_p_mm)
-        aligned = state.view
-        if moved < 1.0:
+        former = state.view.edge_p_mm
+        heights = _imaged_heights(turned, former)
+        state = _aligned(turned, quads, state.view, outline, heights, keep_height)
+        if abs(state.view.edge_p_mm - former) < SETTLED_MM:
             break
-    assert state is not None
-    scale, offset = _scale(turned, view, share, low, high, keep_height)
-    return Scaling(np.diag(scale) @ plate_rotation(view.angle_deg), offset, share, high - low, state)
+    scale, offset = _scale(turned, view, heights, keep_height)
+    return Scaling(np.diag(scale) @ plate_rotation(view.angle_deg), offset, heights[1] - heights[0], state)
 
 
 def fit_thickness(
@@ -80,14 +72,15 @@ def fit_thickness(
         shares: smallest and largest gap that is considered, as shares of the uncompressed height.
     """
     turned = breast_to_plate(skin, view.angle_deg)
-    low, high = _imaged_heights(turned, view.edge_p_mm)
+    heights = _imaged_heights(turned, view.edge_p_mm)
+    height = heights[1] - heights[0]
 
     def misfit(share: float) -> float:
-        at = replace(view, thickness_mm=share * (high - low))
-        return _aligned(turned, quads, at, outline, 0.5, low, high, False).rms_mm
+        at = replace(view, thickness_mm=share * height)
+        return _aligned(turned, quads, at, outline, heights, keep_height=False).rms_mm
 
     found = minimize_scalar(misfit, bounds=shares, method="bounded", options={"xatol": 0.01})
-    return float(found.x) * (high - low)
+    return float(found.x) * height
 
 
 def _imaged_heights(turned: Points, edge_p_mm: float) -> tuple[float, float]:
@@ -97,10 +90,11 @@ def _imaged_heights(turned: Points, edge_p_mm: float) -> tuple[float, float]:
 
 
 def _scale(
-    turned: Points, view: ViewGeometry, share: float, low: float, high: float, keep_height: bool
+    turned: Points, view: ViewGeometry, heights: tuple[float, float], keep_height: bool
 ) -> tuple[Points, Points]:
+    low, high = heights
     ratio = min(1.0, view.thickness_mm / (high - low))
-    scale = np.array([ratio**-share, ratio ** (share - 1.0), ratio])
+    scale = np.array([ratio**-0.5, ratio**-0.5, ratio])
     middle = 0.5 * (low + high)
     anchor = np.array([0.5 * (turned[:, 0].min() + turned[:, 0].max()), turned[:, 1].max(), middle])
     target = anchor.copy()
@@ -114,12 +108,10 @@ def _aligned(
     quads: NDArray[np.intp],
     view: ViewGeometry,
     outline: RadialOutline,
-    share: float,
-    low: float,
-    high: float,
+    heights: tuple[float, float],
     keep_height: bool,
 ) -> Alignment:
-    scale, offset = _scale(turned, view, share, low, high, keep_height)
+    scale, offset = _scale(turned, view, heights, keep_height)
     if not keep_height:
-        view = replace(view, height_mm=0.5 * (low + high) - 0.5 * view.thickness_mm)
+        view = replace(view, height_mm=0.5 * (heights[0] + heights[1]) - 0.5 * view.thickness_mm)
     return align(turned * scale + offset, quads, view, outline)
