@@ -1,5 +1,7 @@
 """Stage `segment`: the breast of the MR volume: tissues, mask, chest-wall surface, nipple; the second volume's mask."""
 
+from dataclasses import replace
+
 import numpy as np
 from pydantic import Field
 
@@ -41,13 +43,9 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     fields = _fields(found, side)
     if compressed_path is None:
         return fields
-    mask, suppressed = segment_body(read_mr(compressed_path).between_lps_and_breast(side), settings.spacing_mm)
+    mask = segment_body(read_mr(compressed_path).between_lps_and_breast(side), settings.spacing_mm)
     volume = VolumeField(mask.between_lps_and_breast(side), "1", "body in the compressed volume, chest included")
-    return Fields(
-        arrays=fields.arrays,
-        volumes={**fields.volumes, "compressed_mask": volume},
-        values={**fields.values, "compressed_fat_suppressed": suppressed},
-    )
+    return replace(fields, volumes={**fields.volumes, "compressed_mask": volume})
 
 
 def _back_settings(settings: Settings) -> BackSettings:

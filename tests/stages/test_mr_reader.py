@@ -21,7 +21,7 @@ TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
 def linear_field(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Intensities that linear interpolation meets exactly."""
-    return 300.0 + points @ np.array([1.0, -2.0, 0.5])
+    return np.asarray(300.0 + points @ np.array([1.0, -2.0, 0.5]))
 
 
 def sampled(affine: NDArray[np.float64], shape: tuple[int, int, int]) -> NDArray[np.float64]:

@@ -119,13 +119,23 @@ def test_breast_without_torso_ends_at_the_muscle_or_with_the_volume(end: float) 
 
 
 def test_body_of_a_second_volume_includes_the_chest() -> None:
-    mask, suppressed = segment_body(torso(fat_suppressed=False), 2.0)
-    assert suppressed is False
-    assert mask.sample(np.array([[-70.0, 20.0, 0.0], [-70.0, 80.0, 0.0], [-70.0, -40.0, 0.0]]), order=0).tolist() == [
-        1,
-        1,
-        0,
-    ]
+    mask = segment_body(torso(fat_suppressed=False), 2.0)
+    places = np.array([[-70.0, 20.0, 0.0], [-70.0, 80.0, 0.0], [-70.0, -40.0, 0.0]])
+    assert mask.sample(places, order=0).tolist() == [1, 1, 0]
+
+
+def test_a_ghost_beside_one_breast_is_not_taken_for_the_other() -> None:
+    """Lateral noise and arms rise as a low hill beside the breast."""
+    volume = torso((RIGHT,), x_range=(-140.0, 20.0))
+    points = voxel_centres(volume)
+    hill = (points[..., 0] < -118.0) & (points[..., 1] > CHEST_P - 5.0)
+    found = segment_volume(volume.with_data(np.where(hill, 100.0, volume.data)), None, SETTINGS, no_bias)
+    assert np.linalg.norm(found.nipple - RIGHT.nipple_point()) < 7.5
+
+
+def test_the_other_breast_alone_is_refused() -> None:
+    with pytest.raises(DataError, match="other side"):
+        segment_volume(torso((LEFT,)), None, SETTINGS, no_bias)
 
 
 @pytest.mark.parametrize(

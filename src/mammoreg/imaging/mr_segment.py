@@ -91,17 +91,14 @@ def segment_volume(
     return Segmentation(corrected, tissues, breast, back_points(breast, grid, back), nipple, suppressed)
 
 
-def segment_body(volume: Volume, spacing_mm: float) -> tuple[Volume, bool]:
-    """Mask (uint8) of the body in a volume of the breast frame around one breast, and whether fat is suppressed.
+def segment_body(volume: Volume, spacing_mm: float) -> Volume:
+    """Mask (uint8) of the body around the wanted breast in a volume of the breast frame, chest included.
 
     Raises:
         DataError: no usable breast in the volume.
     """
-    grid, body, place = locate_body(volume, None, spacing_mm)
-    front = body.copy()
-    front[:, int(grid.to_index(place.apex)[1] + 60.0 / spacing_mm) :] = False
-    suppressed = is_fat_suppressed(grid.data, depth_below_skin(body, grid.spacing), front)
-    return grid.with_data(body.astype(np.uint8)), suppressed
+    grid, body, _ = locate_body(volume, None, spacing_mm)
+    return grid.with_data(body.astype(np.uint8))
 
 
 def locate_body(volume: Volume, labels: Volume | None, spacing_mm: float) -> tuple[Volume, Mask, BreastPlace]:
