@@ -124,7 +124,7 @@ def _sections(artefacts: Sequence[Artefact]) -> list[Section]:
         _section("Lesion in the mammogram against the truth", TABLE_5, artefacts),
         _section("Lesion in the MR volume against the truth", TABLE_6, artefacts),
         section_of("Landmarks against the truth", _landmark_rows(artefacts)),
-        _section("Pose and fit of each view", VIEWS, artefacts),
+        _turned(_section("Pose and fit of each view", VIEWS, artefacts)),
     ]
 
 
@@ -138,6 +138,13 @@ def _section(heading: str, table: Table, artefacts: Sequence[Artefact], names: s
     filled = [c for c in table.columns if c != "case" and any(row.get(c) not in (None, "") for row in rows)]
     place = [table.columns.index(column) for column in filled]
     return Section(heading, filled, [[line[i] for i in place] for line in cells(table, rows)])
+
+
+def _turned(section: Section) -> Section:
+    """A table with many columns and few rows, turned: one column per view and method, which stand first."""
+    heads = [" ".join(row[:2]) for row in section.rows]
+    lines = [[name, *(row[i] for row in section.rows)] for i, name in enumerate(section.columns)][2:]
+    return Section(section.heading, ["", *heads], lines)
 
 
 def _landmark_rows(artefacts: Sequence[Artefact]) -> list[dict[str, Any]]:
