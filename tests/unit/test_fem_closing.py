@@ -14,7 +14,6 @@ from mammoreg.materials.elastic import neo_hookean
 from mammoreg.meshing.block import BlockMesh
 from tests.unit.fe_bodies import block
 
-STIFF = ClosingOptions(penalty_per_mm=20.0, band_mm=0.2)
 EDGE, GAP = 5.0, 55.0
 
 
@@ -34,7 +33,7 @@ def closing(
     mesh: BlockMesh,
     name: BackName = "slide_compression",
     friction: float = 0.3,
-    options: ClosingOptions = STIFF,
+    options: ClosingOptions | None = None,
     pull: NDArray[np.float64] | None = None,
 ) -> Closing:
     model = HyperelasticModel(mesh.points, mesh.hexes(), neo_hookean(9.4, 0.495))
@@ -99,6 +98,12 @@ def test_coarse_options_are_near_the_fine_ones(closed: Closed) -> None:
     coarse = closing(breast(), options=COARSE).close(GAP)
     shift = closed.height_mm - coarse.height_mm
     assert np.abs(coarse.deformed + np.array([0.0, 0.0, shift]) - closed.deformed).mean() < 1.5
+
+
+def test_soft_contact_alone_lets_more_pass(closed: Closed) -> None:
+    soft = closing(breast(), options=ClosingOptions(stiffening=())).close(GAP)
+    assert closed.penetration_mm < 0.5 * soft.penetration_mm
+    assert closed.iterations < 2 * soft.iterations
 
 
 def test_plates_wider_than_the_breast_are_refused() -> None:

@@ -8,7 +8,7 @@ Newton's method does not chatter between sticking and slipping. Terms are per fa
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +72,10 @@ class SoftContact:
     band_mm: float = 1.0
     friction: float = 0.0
     slip_mm: float = 1.0
+
+    def stiffened(self, factor: float) -> "SoftContact":
+        """The same contact, stiffer by a factor; its onset shrinks alike, which keeps the pressure at the plate."""
+        return replace(self, stiffness=factor * self.stiffness, band_mm=self.band_mm / factor)
 
     def start(self, nodes: Array, plates: Sequence[Plate], height: float) -> SoftMemory:
         """Memory of a body that has not touched yet, at nodes (N, 3)."""

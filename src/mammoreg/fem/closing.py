@@ -18,6 +18,7 @@ from mammoreg.fem.sparse import Array
 from mammoreg.fem.ties import PlaneTies
 
 LEAST_GUESS_DET = 0.2  # an affine guess that squeezes an element further is not used
+STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
 REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
 RESTLESS_MM = 1.0  # a breast that still moves further in its last step has not come to rest
 
@@ -32,7 +33,8 @@ class ClosingOptions:
         tolerance_mm: Newton iterations end below this; the breast rests when it moves less.
         damping: factor of the damping in load steps.
         rests: steps at rest at most.
-        penalty_per_mm: stiffness of the contact in units of the mean shear modulus.
+        penalty_per_mm: stiffness of the contact in units of the mean shear modulus while the plates close.
+        stiffening: factors of that stiffness, one after the other, once the plates have closed.
         band_mm: height of the contact's smooth onset.
         slip_mm: displacement at which friction reaches its limit.
         rule: contact points of a face.
@@ -47,9 +49,10 @@ class ClosingOptions:
     band_mm: float = 1.0
     slip_mm: float = 2.5
     rule: Rule = "simpson"
+    stiffening: tuple[float, ...] = (3.0, 10.0)
 
 
-COARSE = ClosingOptions(steps=7, tolerance_mm=0.2, damping=1.0, rests=7, band_mm=2.0)
+COARSE = ClosingOptions(steps=5, tolerance_mm=0.5, damping=1.0, rests=7, band_mm=2.0)
 """For the search of a pose: answers to some tenths of a millimetre."""
 
 
@@ -170,7 +173,7 @@ class Closing:
                 continue
             done, last, taken = share, gap, taken + 1
             step = min(1.5 * step, 1.0 / self.options.steps)
-        return self._rested(equilibrium, state, gap_mm, taken, cuts, self.options.damping)
+        return self._settled(equilibrium, state, gap_mm, taken, cuts, self.options.damping)
 
     def rest(self, closed: Closed, ties: PlaneTies, damping: float) -> Closed:
         """Go on from a closed state with an outline drawing on the skin.
@@ -178,7 +181,8 @@ class Closing:
         Raises:
             NotConvergedError: with the reason.
         """
-        return self._rested(self.equilibrium(ties), closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
+        equilibrium = self.equilibrium(ties)
+        return self._settled(equilibrium, closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
 
     def _anchors(self, share: float) -> Array:
         anchors = self.model.points.copy()
@@ -195,6 +199,21 @@ class Closing:
         guess = np.where(equilibrium.held, anchors, guess)
         start = replace(state, positions=guess)
         return equilibrium.step(start, plates, anchors, self.options.damping, self.options.tolerance_mm)
+
+    def _settled(
+        self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
+    ) -> Closed:
+        """Rest in the stiffened contact or, where that is not found, in the soft one."""
+        plates, anchors, stiff, eased = self.plates(gap_mm), self._anchors(1.0), equilibrium, state
+        try:
+            for factor in self.options.stiffening:
+                eased = stiff.step(eased, plates, anchors, damping, self.options.tolerance_mm)
+                stiff = equilibrium.with_contact(self.contact.stiffened(factor))
+            return self._rested(stiff, eased, gap_mm, taken, cuts, STIFF_DAMPING * damping)
+        except NotConvergedError:
+            if not self.options.stiffening:
+                raise
+        return self._rested(equilibrium, state, gap_mm, taken, cuts + 1, damping)
 
     def _rested(
         self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
@@ -232,7 +251,7 @@ class Closing:
             height_mm=plates[0].height_mm + state.height,
             gap_mm=gap_mm,
             force_n=(float(forces[0]), float(forces[1])),
-            iterations=equilibrium.iterations,
+            iterations=len(equilibrium.residuals),
             steps=taken,
             cuts=cuts,
             residuals=equilibrium.residuals,

@@ -6,6 +6,7 @@ steps are repeated with less of it the static equilibrium remains.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,8 +46,7 @@ class DampedEquilibrium:
         ties: springs towards an outline.
 
     Attributes:
-        iterations: Newton iterations so far.
-        residuals: residual ratio of each.
+        residuals: residual ratio of each Newton iteration so far.
     """
 
     def __init__(
@@ -66,7 +66,13 @@ class DampedEquilibrium:
         free: Integers = np.flatnonzero(np.append(~self.held.ravel(), free_height))
         self.system = NewtonSystem(model, self._groups(), free, self.total)
         self.weight = self._weight()
-        self.iterations, self.residuals = 0, list[float]()
+        self.residuals: list[float] = []
+
+    def with_contact(self, contact: SoftContact) -> "DampedEquilibrium":
+        """The same equations and record with another contact of the same faces."""
+        other = copy(self)
+        other.contact = contact
+        return other
 
     def _groups(self) -> list[Integers]:
         """Degrees of freedom of springs, contact, damping and ties."""
@@ -136,7 +142,6 @@ class DampedEquilibrium:
             vectors.append(self.ties.force(state.positions))
             blocks.append(self.ties.blocks())
         self.residuals.append(self.system.unbalance(vectors))
-        self.iterations += 1
         return self.system.increment(internal, vectors, blocks)
 
     def _moved(self, state: DampedState, update: Array, pressure: Array) -> tuple[DampedState, float]:
@@ -152,4 +157,3 @@ class DampedEquilibrium:
             height=state.height + share * float(update[-1]),
         )
         return moved, largest
-

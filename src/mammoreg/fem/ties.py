@@ -29,7 +29,7 @@ class PlaneTies:
     def distance(self, positions: Array) -> Array:
         """Distance (T,) of the points from their planes at deformed nodes (N, 3), mm."""
         points = np.einsum("ta,tai->ti", self.shape, positions[self.nodes])
-        return np.einsum("ti,ti->t", points, self.direction) - self.offset
+        return np.asarray(np.einsum("ti,ti->t", points, self.direction) - self.offset)
 
     def force(self, positions: Array) -> Array:
         """Residual (T, 12) in mN."""
