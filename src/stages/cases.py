@@ -2,6 +2,7 @@
 
 import csv
 import difflib
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -204,7 +205,7 @@ def _row(
     cells = {name: cell for name, cell in zip(header, line, strict=False) if cell}
     for name, info in model.model_fields.items():
         if name in cells and info.annotation in (Path, Path | None):
-            cells[name] = str(path.parent / cells[name])
+            cells[name] = os.path.normpath(path.parent / cells[name])
     try:
         return model.model_validate(cells)
     except ValidationError as error:

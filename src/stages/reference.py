@@ -19,6 +19,7 @@ from stages.cases import CaseRow, ViewRow
 from stages.config import config_model
 
 WIDTH = 116
+LONGEST = 60
 
 
 def reference_files(project: Path) -> dict[Path, str]:
@@ -53,8 +54,14 @@ def _yaml_lines(model: type[BaseModel], defaults: BaseModel, indent: str) -> Ite
             yield f"{indent}{name}:\n"
             yield from _yaml_lines(type(value), value, indent + "  ")
         else:
-            text = yaml.safe_dump(defaults.model_dump(mode="json")[name], default_flow_style=True, width=1000)
-            yield f"{indent}{name}: {text.removesuffix('...' + chr(10)).strip()}\n"
+            yield textwrap.indent(_entry(name, _json(defaults)[name]), indent)
+
+
+def _entry(name: str, value: Any) -> str:
+    """A key and its value: lists and the innermost mappings on one line."""
+    return yaml.safe_dump(
+        {name: value}, default_flow_style=None if isinstance(value, dict | list) else False, width=WIDTH
+    )
 
 
 def _meaning(info: FieldInfo) -> str:
@@ -90,7 +97,8 @@ def _key_rows(model: type[BaseModel], defaults: BaseModel, prefix: str) -> Itera
         if isinstance(value, BaseModel):
             yield from _key_rows(type(value), value, f"{prefix}{name}.")
         else:
-            yield f"`{prefix}{name}`", f"`{json.dumps(_json(defaults)[name])}`", _meaning(info)
+            text = json.dumps(_json(defaults)[name])
+            yield f"`{prefix}{name}`", f"`{text}`" if len(text) <= LONGEST else "see config.yaml", _meaning(info)
 
 
 def _json(model: BaseModel) -> Mapping[str, Any]:
