@@ -14,7 +14,7 @@ from mammoreg.phantom.patient import HEADER_ANGLE_DEG, Patient, View
 from mammoreg.phantom.shape import Array as Points
 from mammoreg.phantom.skin_points import skin_points
 from mammoreg.phantom.warp import Deformed
-from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject
+from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.digital_files import mammogram_dicom, mask_png, nifti, points_tsv
 
 MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1000, 700
@@ -69,7 +69,7 @@ class Making:
         self.subject, self.chosen, self.patient = subject, chosen, patient
         self.files: dict[str, bytes] = {}
         self.arrays: dict[str, Array] = {}
-        self.values: dict[str, float | str | list[float]] = {"seed": chosen.seed}
+        self.values: dict[str, Value] = {"seed": chosen.seed}
         contrast, noise = (T1_FAT_SUPPRESSED, FAT_SUPPRESSED_NOISE) if chosen.fat_suppressed else (T1, NOISE)
         self.acquisition = Acquisition(contrast, noise, BIAS)
         self.names = [f"P{n + 1:02d}" for n in range(len(patient.landmarks))]
@@ -92,7 +92,7 @@ class Making:
         """MR before and between the plates, with landmarks and points of the skin in both."""
         self._undeformed_mr()
         pressed, deformed = self.patient.pressed("3D")
-        self._note_press("3D", pressed, deformed)
+        self._note_press("3D", pressed, deformed, None)
         grid = self.patient.mr_grid(MR_MM, False)
         origins = deformed.tabulated(grid.origin - MR_MM, grid.to_world(np.array(grid.shape)))
         data = acquire(grid, origins.at, self.acquisition, self.patient.stream(2))
@@ -117,11 +117,10 @@ class Making:
     def _mammogram(self, view: View, number: int) -> None:
         patient, random = self.patient, self.patient.stream(20 + number)
         pressed, deformed = patient.pressed(view)
-        self._note_press(view, pressed, deformed)
         low, high = pressed.deformed.min(axis=0), pressed.deformed.max(axis=0)
         middle = 0.5 * (low[0] + high[0]) + float(random.uniform(-OFF_CENTRE_MM, OFF_CENTRE_MM))
         geometry = view_geometry(patient, view, pressed, middle)
-        self.values[f"{view}/middle_mm"] = middle
+        self._note_press(view, pressed, deformed, middle)
         pectoral = Pectoral(low[0], 40.0, 0.7 * (high[0] - low[0]), 0.6) if view == "MLO" else None
         origins = deformed.tabulated(*_around(deformed.deformed))
         image = project(geometry, origins.at, (low[0] - 2.0, high[0] + 2.0), low[1] - 10.0, pectoral)
@@ -141,7 +140,7 @@ class Making:
         shown = ((pixel > -0.5) & (pixel < [COLUMNS - 0.5, ROWS - 0.5])).all(axis=1)
         if self.subject.laterality == "R":
             pixel[:, 0] = COLUMNS - 1 - pixel[:, 0]
-        names = [n for n, seen in zip(self.names, shown, strict=True) if seen]
+        names = [self.names[k] for k in np.flatnonzero(shown)]
         self.files[name] = points_tsv(names, pixel[shown], ("column", "row"))
 
     def _points_file(self, name: str, names: list[str], points: Points) -> None:
@@ -150,20 +149,21 @@ class Making:
     def _note(self, name: str, points: Points, units: str, meaning: str) -> None:
         self.arrays[name] = Array(lps_to_breast(points, self.subject.laterality), units, f"{meaning} (LPS)")
 
-    def _note_press(self, view: View, pressed: Pressed, deformed: Deformed) -> None:
+    def _note_press(self, view: View, pressed: Pressed, deformed: Deformed, middle_mm: float | None) -> None:
         """Truth about a compression."""
         placement = self.patient.placements[view]
-        self.values |= {
-            f"{view}/angle_deg": placement.angle_deg,
-            f"{view}/header_angle_deg": HEADER_ANGLE_DEG[view],
-            f"{view}/edge_p_mm": placement.edge_p_mm,
-            f"{view}/height_mm": pressed.height_mm,
-            f"{view}/thickness_mm": pressed.gap_mm,
-            f"{view}/uncompressed_mm": pressed.uncompressed_mm,
-            f"{view}/pull_mm": placement.pull_mm,
-            f"{view}/force_n": pressed.force_n,
-            f"{view}/min_det_f": pressed.min_det_f,
-            f"{view}/iterations": float(pressed.iterations),
+        self.values[view] = {
+            "angle_deg": placement.angle_deg,
+            "header_angle_deg": HEADER_ANGLE_DEG[view],
+            "edge_p_mm": placement.edge_p_mm,
+            "middle_mm": middle_mm,
+            "height_mm": pressed.height_mm,
+            "thickness_mm": pressed.gap_mm,
+            "uncompressed_mm": pressed.uncompressed_mm,
+            "pull_mm": placement.pull_mm,
+            "force_n": pressed.force_n,
+            "min_det_f": pressed.min_det_f,
+            "iterations": pressed.iterations,
         }
         self._note(f"{view}/nodes", deformed.deformed, "mm", "nodes of the truth's mesh between the plates")
         self._note(f"{view}/landmarks", deformed.forward(self.patient.landmarks), "mm", "landmarks between the plates")

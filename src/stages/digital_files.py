@@ -54,8 +54,13 @@ def mask_png(mask: NDArray[np.bool_], laterality: Laterality) -> bytes:
 
 
 def mammogram_dicom(
-    image: NDArray[np.uint16], subject: Subject, view: str, geometry: ViewGeometry, thickness_mm: float,
-    force_n: float, monochrome1: bool,
+    image: NDArray[np.uint16],
+    subject: Subject,
+    view: str,
+    geometry: ViewGeometry,
+    thickness_mm: float,
+    force_n: float,
+    monochrome1: bool,
 ) -> bytes:
     """A canonical image as DICOM mammogram; the header holds what a machine knows, not the truth."""
     pixels = _stored(4095 - image if monochrome1 else image, subject.laterality)
@@ -105,9 +110,7 @@ def _describe_machine(dataset: Dataset, geometry: ViewGeometry, view: str) -> No
     dataset.BreastImplantPresent, dataset.PartialView, dataset.BurnedInAnnotation = "NO", "NO", "NO"
 
 
-def _describe_pixels(
-    dataset: Dataset, pixels: NDArray[np.generic], pixel_mm: float, monochrome1: bool
-) -> None:
+def _describe_pixels(dataset: Dataset, pixels: NDArray[np.generic], pixel_mm: float, monochrome1: bool) -> None:
     dataset.Rows, dataset.Columns = pixels.shape
     dataset.ImagerPixelSpacing = [pixel_mm, pixel_mm]
     dataset.SamplesPerPixel, dataset.PixelRepresentation = 1, 0

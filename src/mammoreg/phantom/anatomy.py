@@ -85,8 +85,9 @@ class Anatomy:
 
     def _undulation(self, points: Array) -> Array:
         """Unevenness of the muscle's front, mm; it is nearer to the skin towards the arm."""
-        waves = np.sin(points[:, 2] / 14.0 + points[:, 0] / 23.0) + np.sin(points[:, 2] / 6.1 - points[:, 0] / 9.0) * 0.4
-        return np.asarray(1.2 * waves + 0.03 * (points[:, 2] - self.shape.centre_s))
+        m, s = points[:, 0], points[:, 2]
+        waves = np.sin(s / 14.0 + m / 23.0) + 0.4 * np.sin(s / 6.1 - m / 9.0)
+        return np.asarray(1.2 * waves + 0.03 * (s - self.shape.centre_s))
 
     def _between_ribs(self, points: Array) -> NDArray[np.bool_]:
         """Ribs run obliquely, one every 28 mm."""
@@ -101,7 +102,11 @@ class Anatomy:
 
 
 def build_anatomy(
-    shape: BreastShape, layers: Layers, gland_share: float, lesion: Lesion | None, box: tuple[Array, Array],
+    shape: BreastShape,
+    layers: Layers,
+    gland_share: float,
+    lesion: Lesion | None,
+    box: tuple[Array, Array],
     random: Generator,
 ) -> Anatomy:
     """Fill a shape with tissue.
@@ -151,7 +156,7 @@ def _gland_volume(shape: BreastShape, depth: Volume, gland_share: float, random:
     score, septa = _gland_score(shape, points[inner], ratio.ravel()[index][inner], below[inner], random)
     share = np.zeros(grid.data.size, dtype=np.float32)
     threshold = float(np.quantile(score, 1.0 - gland_share))
-    gland = np.maximum(smooth_step(score, threshold, 0.5), SEPTUM_SHARE * septa)
+    gland = np.maximum(smooth_step(score, threshold, 0.8), SEPTUM_SHARE * septa)
     share[index[inner]] = gland
     return grid.with_data(share.reshape(grid.shape))
 
@@ -170,7 +175,7 @@ def _gland_score(
     score = -((ratio / 0.75) ** 2) - 2.5 * np.exp(-depth / 3.5) - 2.0 * np.clip(0.2 - forward, 0.0, None) / 0.2
     near_nipple = np.exp(-((np.linalg.norm(points - shape.tip, axis=1) / 16.0) ** 2))
     score += 0.2 * sideways + 1.6 * near_nipple
-    score = score + 0.45 * lobes + 0.55 * ducts + 0.5 * islands + 0.3 * grain
+    score = score + 0.35 * lobes + 0.65 * ducts + 0.55 * islands + 0.45 * grain
     septa = np.exp(-np.square(sheets / 0.15)) * smooth_step(depth.astype(np.float32), 3.0, 2.0)
     return score.astype(np.float32), septa.astype(np.float32)
 

@@ -155,7 +155,8 @@ class Press:
         size = float(np.linalg.norm(self._summed([np.abs(v) for v in vectors])))
         volume = float(np.abs(internal.volume / self.model.volume).max())
         ratio = max(float(np.linalg.norm(residual)) / max(size, 1.0), volume)
-        return Balance(residual, ratio, [stiffness, springs, touch.stiffness], internal.volume, internal.coupling, touch)
+        blocks = [stiffness, springs, touch.stiffness]
+        return Balance(residual, ratio, blocks, internal.volume, internal.coupling, touch)
 
     def _springs(self, state: State, step: Step) -> tuple[Array, Array]:
         """Forces (N, 3) and stiffness (N, 3, 3) of wall and damping."""
@@ -168,7 +169,8 @@ class Press:
 
     def _summed(self, vectors: list[Array]) -> Array:
         index = np.concatenate([group.ravel() for group in self.groups])
-        return np.bincount(index, np.concatenate([v.ravel() for v in vectors]), minlength=self.model.points.size)
+        values = np.concatenate([v.ravel() for v in vectors])
+        return np.asarray(np.bincount(index, values, minlength=self.model.points.size), dtype=float)
 
     def _improved(self, state: State, balance: Balance, step: Step) -> tuple[State, Balance]:
         """One Newton step, shortened until no element collapses and the work along it has lessened."""

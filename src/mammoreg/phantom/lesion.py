@@ -40,7 +40,7 @@ class Lesion:
         angle = np.arccos(np.clip((direction @ self.spicules.T).max(axis=1), -1.0, 1.0))
         edge = 1.0 + SPICULE_REACH * np.exp(-((angle / SPICULE_ANGLE_RAD) ** 2))
         scale = float(np.cbrt(self.half_axes.prod()))
-        return np.clip((edge - distance) * scale / EDGE_MM + 0.5, 0.0, 1.0)
+        return np.asarray(np.clip((edge - distance) * scale / EDGE_MM + 0.5, 0.0, 1.0))
 
 
 @dataclass(frozen=True)

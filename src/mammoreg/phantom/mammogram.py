@@ -18,7 +18,7 @@ FAT_PER_MM, GLAND_PER_MM, SKIN_PER_MM, MUSCLE_PER_MM, LESION_PER_MM = 0.0513, 0.
 LESION_PATH_MM = 1.0
 """A beam that passes at least this much lesion belongs to the lesion's mask."""
 
-CONTRAST = 2.5
+CONTRAST = 3.0
 """Exponent of the presentation: spreads the grey values of dense tissue."""
 
 Image = NDArray[np.float32]
@@ -122,7 +122,12 @@ def project(
 
 
 def _slab(
-    view: ViewGeometry, tissue_at: Callable[[Array], Tissue], m: Array, p: Array, height: float, pectoral: Pectoral | None
+    view: ViewGeometry,
+    tissue_at: Callable[[Array], Tissue],
+    m: Array,
+    p: Array,
+    height: float,
+    pectoral: Pectoral | None,
 ) -> NDArray[np.float32]:
     """Attenuation and share of lesion (2, len(m), len(p)) at one height."""
     grid = np.stack(np.meshgrid(m, p, [height], indexing="ij"), axis=-1).reshape(-1, 3)
@@ -170,4 +175,5 @@ def presented(projection: Projection, exposure: Exposure, pixel_mm: float, rando
     level = float(np.percentile(thick[inside > 0.0], 80.0)) if inside.any() else 0.0
     image = image + inside * exposure.equalisation * np.maximum(level - thick, 0.0)
     bright = np.maximum(image, 0.0) / float(np.percentile(image, 99.9))
-    return np.clip(np.round(60.0 + 3700.0 * bright**CONTRAST + 400.0 * image), 0.0, 4095.0).astype(np.uint16)
+    grey = np.round(60.0 + 900.0 * bright + 2900.0 * bright**CONTRAST)
+    return np.asarray(np.clip(grey, 0.0, 4095.0), dtype=np.uint16)

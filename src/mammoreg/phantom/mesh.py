@@ -75,7 +75,7 @@ def _core_point(a: Array, b: Array, c: Array) -> Array:
     length = np.linalg.norm(cube, axis=-1, keepdims=True)
     biggest = np.abs(cube).max(axis=-1, keepdims=True)
     bulge = np.divide(biggest, length, out=np.ones_like(length), where=length > 0.0)
-    return CORE_SHARE * cube * (0.6 + 0.4 * bulge) * 1.15
+    return np.asarray(CORE_SHARE * cube * (0.6 + 0.4 * bulge) * 1.15)
 
 
 def _core_cells(core: int, rows: int) -> Array:
@@ -121,7 +121,7 @@ def _shell_point(side: int, u: Array, v: Array, w: Array) -> Array:
     inner = _core_point(face[..., 0], face[..., 1], face[..., 2])
     even = np.tan(np.pi / 4.0 * face)
     outer = even / np.linalg.norm(even, axis=-1, keepdims=True)
-    return inner + w[..., None] * (outer - inner)
+    return np.asarray(inner + w[..., None] * (outer - inner))
 
 
 def _onto_breast(shape: BreastShape, ball: Array) -> Array:

@@ -77,9 +77,7 @@ def acquire(
     return np.round(np.hypot(real, imaginary)).astype(np.int16)
 
 
-def _plane(
-    grid: Volume, index: int, tissue_at: Callable[[Array], Tissue], contrast: Contrast
-) -> NDArray[np.float32]:
+def _plane(grid: Volume, index: int, tissue_at: Callable[[Array], Tissue], contrast: Contrast) -> NDArray[np.float32]:
     """Mean signal of one plane of voxels across the first axis."""
     offsets = (np.arange(SUBSAMPLES) + 0.5) / SUBSAMPLES - 0.5
     axes = [(np.arange(n)[:, None] + offsets).ravel() for n in (1, *grid.shape[1:])]

@@ -35,4 +35,4 @@ class SmoothNoise:
 
 def smooth_step(values: NDArray[np.float32], middle: float, width: float) -> NDArray[np.float32]:
     """0 below, 1 above `middle`, a linear ramp of `width` between."""
-    return np.clip((values - np.float32(middle)) / np.float32(width) + np.float32(0.5), 0.0, 1.0)
+    return np.asarray(np.clip((values - np.float32(middle)) / np.float32(width) + np.float32(0.5), 0.0, 1.0))

@@ -25,8 +25,8 @@ View = Literal["CC", "MLO", "3D"]
 HEADER_ANGLE_DEG: dict[View, float] = {"CC": 0.0, "MLO": 45.0, "3D": 0.0}
 
 TORSO = {"half_width": (180.0, 200.0), "half_depth": (115.0, 135.0), "tilt": (0.03, 0.12)}
-SIZE = (0.80, 1.22)
-"""Factor on the lengths of `SCALED`: breasts of about 250 to 1000 ml."""
+SIZE = (0.92, 1.25)
+"""Factor on the lengths of `SCALED`: breasts of about 350 to 1000 ml."""
 SCALED = ("length", "lateral", "medial", "inferior", "superior", "drop_m", "drop_s")
 SHAPE = {
     "centre_m": (-88.0, -78.0),
@@ -48,7 +48,7 @@ SHAPE = {
     "back_lift": (7.0, 10.0),
 }
 LAYERS = {"skin": (1.3, 1.8), "fat": (12.0, 18.0), "muscle": (8.0, 13.0), "ribs": (8.0, 10.0)}
-GLAND_SHARE = (0.12, 0.30)
+GLAND_SHARE = (0.12, 0.26)
 MECHANICS = {
     "fat_kpa": (3.5, 5.0),
     "gland_ratio": (3.0, 5.0),

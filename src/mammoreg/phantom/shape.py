@@ -109,7 +109,7 @@ class BreastShape:
     @property
     def nipple(self) -> Array:
         """Tip of the nipple (3,), mm."""
-        return self.tip - np.array([0.0, self.nipple_height, 0.0])
+        return np.asarray(self.tip - np.array([0.0, self.nipple_height, 0.0]))
 
     def back(self, m: ArrayLike, s: ArrayLike) -> Array:
         """Posterior coordinate in mm of the surface where the deforming tissue is tied to the chest."""
@@ -146,8 +146,6 @@ class BreastShape:
         across = np.hypot(np.asarray(m, dtype=float) - tip[0], np.asarray(s, dtype=float) - tip[2])
         along = np.asarray(p, dtype=float) - (tip[1] - self.nipple_height)
         rounding = 0.6 * self.nipple_radius
-        outside = np.hypot(
-            np.maximum(across - (self.nipple_radius - rounding), 0.0), np.maximum(rounding - along, 0.0)
-        )
+        outside = np.hypot(np.maximum(across - (self.nipple_radius - rounding), 0.0), np.maximum(rounding - along, 0.0))
         depth: Array = rounding - outside
         return depth

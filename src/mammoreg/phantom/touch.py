@@ -48,11 +48,9 @@ class SkinNodes:
         face = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
         area = np.bincount(quads.ravel(), weights=np.repeat(0.25 * face, 4), minlength=len(points))
         nodes = np.flatnonzero(area > 0.0)
-        return cls(nodes, area[nodes])
+        return cls(nodes, np.asarray(area[nodes], dtype=float))
 
-    def touch(
-        self, places: Array, before: Array, plates: tuple[Plate, ...], layer: float, limit: Array
-    ) -> Touch:
+    def touch(self, places: Array, before: Array, plates: tuple[Plate, ...], layer: float, limit: Array) -> Touch:
         """Contact at nodes' places (C, 3) in mm, which were `before` (C, 3) after the last load step.
 
         Args:
