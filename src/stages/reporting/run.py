@@ -10,6 +10,13 @@ from stages.tabulating.render import Section
 
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "scikit-image", "pypardiso", "simpleitk", "nibabel", "pydicom", "h5py")
 
+_MECHANICS = {
+    "poisson_ratio": "Poisson's ratio {}",
+    "gland_contrast": "shear modulus of gland {} times that of fat",
+    "fibre_ratio": "stiffness in tension along the nipple axis {} times the shear modulus",
+    "friction": "friction coefficient {} between skin and plates",
+}
+
 METHODS_TEXT = (
     "Mammograms and MR volumes were registered with mammoreg {version}, a re-implementation of the model-based "
     "registration of X-ray mammograms and MR images of the female breast. The breast was segmented in the MR volume "
@@ -36,11 +43,10 @@ def methods_paragraph(artefacts: Sequence[Artefact]) -> str:
 
 
 def _mechanics(artefacts: Sequence[Artefact]) -> str:
-    """Tissue, friction and back of the compression in words."""
+    """Tissue and plates of the compression in words."""
     found = [json.loads(a.attrs["settings"]) for a in artefacts if a.stage == "compress" and "settings" in a.attrs]
     settings = found[0].get("mechanics", {}) if found else {}
-    names = {"poisson_ratio": "Poisson's ratio", "friction": "friction coefficient", "back": "chest-wall side"}
-    texts = [f"{text} {str(settings[key]).replace('_', ' ')}" for key, text in names.items() if key in settings]
+    texts = [form.format(settings[key]) for key, form in _MECHANICS.items() if settings.get(key)]
     return ", ".join(texts) or "homogeneous"
 
 
