@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from mammoreg.geometry import Volume
 from mammoreg.geometry.frames import Points
@@ -13,6 +14,9 @@ from mammoreg.projection.regular import interpolate_axis
 
 _COARSER = 3
 _SHELL_MM = 6.0
+_KNOWN_SHARE = 0.5
+_SIX_NEIGHBOURS = ndimage.generate_binary_structure(3, 1).astype(np.int8)
+_MOST_NEIGHBOURS = 5
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,9 @@ def grid_around(points: Points, spacing_mm: float, margin_mm: float = _SHELL_MM)
 def undeformed_positions(inverse: Callable[[Points], Points], grid: PlateGrid) -> NDArray[np.float32]:
     """Where the voxels of a grid came from, (nx, ny, nz, 3), mm: an inverse map sampled coarsely, then interpolated.
 
-    Within an element the inverse is smooth, so that every third voxel is enough (a test holds it to 0.1 mm).
+    Within an element the inverse is smooth, so that every third voxel is enough (a test holds it to 0.1 mm). Samples
+    without an answer are continued from their neighbours, and the border between both is interpolated too: otherwise
+    it would show the coarse samples as steps.
 
     Args:
         inverse: maps points (N, 3) of the plate frame to the breast frame, nan where there is no breast.
@@ -55,9 +61,27 @@ def undeformed_positions(inverse: Callable[[Points], Points], grid: PlateGrid) -
     indices = np.stack(np.meshgrid(*(np.arange(size) for size in coarse), indexing="ij"), axis=-1)
     points = grid.origin + _COARSER * grid.spacing_mm * indices.reshape(-1, 3)
     field: NDArray[np.float32] = inverse(points).astype(np.float32).reshape(*coarse, 3)
+    known = _closed(np.isfinite(field).all(axis=-1))
+    samples = np.concatenate([_continued(field, points.reshape(*coarse, 3)), known[..., None]], axis=-1)
     for axis, size in enumerate(grid.shape):
-        field = interpolate_axis(field, np.arange(size) / _COARSER, axis)
-    return field
+        samples = interpolate_axis(samples.astype(np.float32), np.arange(size) / _COARSER, axis)
+    return np.where(samples[..., 3:] >= _KNOWN_SHARE, samples[..., :3], np.float32(np.nan))
+
+
+def _closed(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Known samples, with holes of single samples inside the breast closed."""
+    around = ndimage.convolve(known.astype(np.int8), _SIX_NEIGHBOURS, mode="constant")
+    return np.asarray(known | (around >= _MOST_NEIGHBOURS))
+
+
+def _continued(field: NDArray[np.float32], points: Points) -> NDArray[np.float32]:
+    """The field with unknown samples displaced as the nearest known one is."""
+    known = np.isfinite(field).all(axis=-1)
+    if known.all() or not known.any():
+        return field
+    _, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
+    displacement = (field - points)[tuple(nearest)]
+    return np.where(known[..., None], field, (points + displacement).astype(np.float32))
 
 
 class MeshInverse:
