@@ -61,7 +61,7 @@ def undeformed_positions(inverse: Callable[[Points], Points], grid: PlateGrid) -
     indices = np.stack(np.meshgrid(*(np.arange(size) for size in coarse), indexing="ij"), axis=-1)
     points = grid.origin + _COARSER * grid.spacing_mm * indices.reshape(-1, 3)
     field: NDArray[np.float32] = inverse(points).astype(np.float32).reshape(*coarse, 3)
-    known = _closed(np.isfinite(field).all(axis=-1))
+    known = _closed(np.asarray(np.isfinite(field).all(axis=-1)))
     samples = np.concatenate([_continued(field, points.reshape(*coarse, 3)), known[..., None]], axis=-1)
     for axis, size in enumerate(grid.shape):
         samples = interpolate_axis(samples.astype(np.float32), np.arange(size) / _COARSER, axis)
@@ -76,7 +76,7 @@ def _closed(known: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def _continued(field: NDArray[np.float32], points: Points) -> NDArray[np.float32]:
     """The field with unknown samples displaced as the nearest known one is."""
-    known = np.isfinite(field).all(axis=-1)
+    known = np.asarray(np.isfinite(field).all(axis=-1))
     if known.all() or not known.any():
         return field
     _, nearest = ndimage.distance_transform_edt(~known, return_indices=True)
