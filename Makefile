@@ -19,7 +19,7 @@ run: .venv/runtime
 	echo "report: $(CURDIR)/results/report.html"; echo "tables: $(CURDIR)/results/tables/"; exit $$status
 
 test: .venv/development
-	$(BIN)/python -m pytest -n auto --dist loadgroup
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
 check: .venv/development
 	$(BIN)/ruff format --check .

@@ -10,8 +10,6 @@ import pytest
 
 from tests.workflow.toy_project import PROJECT, make_cohort, make_project, snakemake, spoil
 
-pytestmark = pytest.mark.xdist_group("workflow")
-
 NOTHING = "Nothing to be done"
 
 
