@@ -1,4 +1,4 @@
-"""The closing plates of stage `compress` as an object, built anew from artefacts where a later stage goes on from it."""
+"""The closing plates of stage `compress` as an object, built anew from artefacts by the stages that go on from it."""
 
 from dataclasses import asdict, replace
 from typing import Any

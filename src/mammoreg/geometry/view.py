@@ -53,16 +53,14 @@ class ViewGeometry:
     @property
     def middle_magnification(self) -> float:
         """Magnification at half the plate gap, by which detector distances are divided (contract, Measures)."""
-        return self.source_detector_mm / (
-            self.source_detector_mm - self.support_detector_mm - 0.5 * self.thickness_mm
-        )
+        return self.source_detector_mm / (self.source_detector_mm - self.support_detector_mm - 0.5 * self.thickness_mm)
 
     def magnification(self, height: NDArray[np.float64]) -> NDArray[np.float64]:
         """Magnification of points at plate-frame heights in mm, any shape."""
         height = np.asarray(height, dtype=float)
         if self.parallel:
             return np.full_like(height, self.middle_magnification)
-        return self.source_detector_mm / (self.source[2] - height)
+        return np.asarray(self.source_detector_mm / (self.source[2] - height))
 
     def project(self, points: Points) -> NDArray[np.float64]:
         """Project points (..., 3) of the plate frame, mm, to pixels (..., 2) as (column, row)."""

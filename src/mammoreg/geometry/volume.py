@@ -1,7 +1,7 @@
 """An axis-aligned volume in one of the frames of this package."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,11 +47,11 @@ class Volume:
         """Centres (N, 3) in mm of the voxels that a mask of the same shape selects, in C order."""
         return self.to_world(np.argwhere(mask))
 
-    def sample(self, points: Points, order: int = 1, outside: float = 0.0) -> NDArray[np.float64]:
+    def sample(self, points: Points, order: Literal[0, 1] = 1, outside: float = 0.0) -> NDArray[np.float64]:
         """Interpolate at points (..., 3) in mm; `order` 0 is nearest, 1 is linear; `outside` fills beyond the grid."""
         index = np.moveaxis(self.to_index(points), -1, 0)
         values = ndimage.map_coordinates(
-            self.data.astype(np.float32), index, order=order, mode="constant", cval=outside, prefilter=order > 1
+            self.data.astype(np.float32), index, order=order, mode="constant", cval=outside, prefilter=False
         )
         return np.asarray(values, dtype=float)
 

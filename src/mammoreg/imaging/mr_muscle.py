@@ -42,13 +42,17 @@ def back_at_muscle(contrast: Volume, body: Mask, apex: Array, min_depth_mm: floa
     depths = np.arange(apex[1] + min_depth_mm, end, 2.0)
     slopes = (-0.2, -0.1, 0.0, 0.1, 0.2)
     trials = [np.array([p, a, b, 0.0, 0.0]) for p, a, b in itertools.product(depths, slopes, slopes)]
-    best = max(trials, key=score, default=None)
+    best: Array | None = max(trials, key=score, default=None)
     if best is None or score(best) < MIN_SCORE:
         return BackSurface(centre, np.array([end - contrast.spacing[1], 0.0, 0.0, 0.0, 0.0]))
     scale = np.array([2.0, 0.05, 0.05, 2e-3, 2e-3])
     simplex = best + np.vstack([np.zeros(5), np.diag(scale)])
     options: Any = {"initial_simplex": simplex, "maxiter": 300}
-    found = optimize.minimize(lambda c: -score(c), best, method="Nelder-Mead", options=options)
+
+    def negative(c: Array) -> float:
+        return -score(c)
+
+    found = optimize.minimize(negative, best.tolist(), method="Nelder-Mead", options=options)
     return BackSurface(centre, np.asarray(found.x, dtype=float))
 
 

@@ -58,7 +58,7 @@ def _skin_index(body: Mask) -> Map:
     inside = np.take_along_axis(soft, first[:, None], axis=1)[:, 0]
     before = np.take_along_axis(soft, np.maximum(first - 1, 0)[:, None], axis=1)[:, 0]
     crossing = first - (inside - 0.5) / np.maximum(inside - before, 1e-3)
-    return np.where(inside > 0.5, crossing, body.shape[1] - 1.0)
+    return np.asarray(np.where(inside > 0.5, crossing, body.shape[1] - 1.0))
 
 
 def _piece_at(front: Mask, volume: Volume, apex: Points) -> Mask:

@@ -13,6 +13,7 @@ from mammoreg.pose.silhouette import Silhouette, detector_mm
 HUBER_MM = 4.0  # gaps beyond this (folds, a nipple in profile) pull with constant force
 ITERATIONS = 12
 SETTLED_MM = 0.01
+LONGEST_STEP_MM = 15.0
 
 
 @dataclass(frozen=True)
@@ -44,9 +45,7 @@ def measure(points: Points, quads: NDArray[np.intp], view: ViewGeometry, outline
     return Alignment(view, model, gap, weight, float(np.sqrt(squares / total)) if total > 0 else float("nan"))
 
 
-def align(
-    points: Points, quads: NDArray[np.intp], view: ViewGeometry, outline: RadialOutline, *, along_only: bool = False
-) -> Alignment:
+def align(points: Points, quads: NDArray[np.intp], view: ViewGeometry, outline: RadialOutline) -> Alignment:
     """Shift the image over the model, across and along the chest wall, until the outlines agree best.
 
     Iterated weighted least squares on the gaps along the outline's normals with Huber's weights.
@@ -56,11 +55,10 @@ def align(
         quads: facets (Q, 4).
         view: geometry to start from; only `edge_p_mm` and `middle_mm` change.
         outline: the mammogram's outline.
-        along_only: keep the chest-wall edge and shift along the chest wall alone.
     """
     state = measure(points, quads, view, outline)
     for _ in range(ITERATIONS):
-        step = _shift(state, outline, along_only)
+        step = _shift(state, outline)
         view = replace(state.view, edge_p_mm=state.view.edge_p_mm + step[0], middle_mm=state.view.middle_mm - step[1])
         state = measure(points, quads, view, outline)
         if np.max(np.abs(step)) < SETTLED_MM:
@@ -68,14 +66,12 @@ def align(
     return state
 
 
-def _shift(state: Alignment, outline: RadialOutline, along_only: bool) -> NDArray[np.float64]:
+def _shift(state: Alignment, outline: RadialOutline) -> NDArray[np.float64]:
     """Least-squares displacement (forward, along), mm, of the model towards the outline."""
     usable = state.weight > 0
     gap = state.gap_mm[usable]
     normal = outline.normal[usable]
     weight = state.weight[usable] * np.minimum(1.0, HUBER_MM / np.maximum(np.abs(gap), 1e-9))
-    if along_only:
-        normal = normal * np.array([0.0, 1.0])
     matrix = normal.T @ (weight[:, None] * normal) + 1e-9 * np.eye(2)
-    step: NDArray[np.float64] = np.linalg.solve(matrix, normal.T @ (weight * gap))
-    return np.clip(step, -15.0, 15.0)
+    step = np.linalg.solve(matrix, normal.T @ (weight * gap))
+    return np.asarray(np.clip(step, -LONGEST_STEP_MM, LONGEST_STEP_MM))

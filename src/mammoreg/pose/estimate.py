@@ -44,8 +44,8 @@ class Tissue:
         excess: attenuation above fat (P,), any unit.
     """
 
-    hexes: NDArray[np.integer]
-    element: NDArray[np.integer]
+    hexes: NDArray[np.int64]
+    element: NDArray[np.int64]
     local: NDArray[np.float64]
     excess: NDArray[np.float64]
 

@@ -33,7 +33,7 @@ class RadialOutline:
     def normal_gap(self, model: Silhouette) -> NDArray[np.float64]:
         """Signed distance (K,) along the outline's normal, mm: positive where the outline lies outside the model."""
         ray = np.stack([np.cos(self.theta), np.sin(self.theta)], axis=-1)
-        return (self.radius - model.radius) * np.einsum("ki,ki->k", ray, self.normal)
+        return np.asarray((self.radius - model.radius) * np.einsum("ki,ki->k", ray, self.normal))
 
     def of_model(self, detector_points: NDArray[np.float64], quads: NDArray[np.intp]) -> Silhouette:
         """Silhouette of a projected surface (N, 2) with quads (Q, 4) on the rays of this outline."""

@@ -73,4 +73,4 @@ def _normal_slope(points: Points, normal: NDArray[np.float64], view: ViewGeometr
 def _arc_length(outline: RadialOutline) -> NDArray[np.float64]:
     """Length of outline (K,) that each ray stands for, mm at the detector."""
     step = np.linalg.norm(np.gradient(outline.points(), axis=0), axis=1)
-    return np.nan_to_num(step)
+    return np.asarray(np.nan_to_num(step))

@@ -2,7 +2,7 @@
 
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +44,7 @@ def read_nifti(path: Path) -> Volume:
     return lps_volume(data, affine, order=0)
 
 
-def lps_volume(data: NDArray[Any], affine: NDArray[np.float64], order: int) -> Volume:
+def lps_volume(data: NDArray[Any], affine: NDArray[np.float64], order: Literal[0, 1]) -> Volume:
     """Reorder voxels so that the axes run along +x, +y, +z of LPS; resample where no reordering does.
 
     Args:
@@ -74,7 +74,9 @@ def _nearest_axes(cosines: NDArray[np.float64]) -> NDArray[np.intp]:
     return axes
 
 
-def _resampled(data: NDArray[Any], affine: NDArray[np.float64], spacing: NDArray[np.float64], order: int) -> Volume:
+def _resampled(
+    data: NDArray[Any], affine: NDArray[np.float64], spacing: NDArray[np.float64], order: Literal[0, 1]
+) -> Volume:
     """An oblique volume on the smallest axis-aligned grid that holds it; 0 outside it."""
     ends = np.array(np.meshgrid(*[(0, n - 1) for n in data.shape])).reshape(3, -1)
     corners = affine[:3, :3] @ ends + affine[:3, 3:]
