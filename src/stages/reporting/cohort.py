@@ -37,10 +37,13 @@ class Card:
 
 
 def cards(statistics: Statistics, done: int, of: int) -> list[Card]:
-    """Complete cases, and the mean distance of the full registration in each group, with the paper's."""
+    """Complete cases, and the mean distance of the full registration in each group, with the paper's.
+
+    One view alone gives a curve and no point, so its group is left to the tables.
+    """
     found = [Card(f"{done} of {of}", "cases complete")]
     for row in statistics:
-        if row["method"] == SHOWN_METHOD and row["mean_mm"]:
+        if row["method"] == SHOWN_METHOD and row["mean_mm"] and "one view" not in row["group"]:
             paper = f"paper: {row['paper_mean_mm']} mm" if row["paper_mean_mm"] else ""
             count = "" if row["n"] == row["of"] else f"{row['n']} of {row['of']} "
             found.append(Card(f"{float(row['mean_mm']):.1f} mm", f"{count}{row['group']}, mean", paper))
