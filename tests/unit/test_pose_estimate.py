@@ -75,7 +75,7 @@ def _grains() -> np.ndarray:
 @cache
 def tissue_of(half_axes: tuple[float, float, float]) -> Tissue:
     mesh = breast(half_axes)
-    axis = np.arange(-90.0, 90.1, 4.0)
+    axis = np.arange(-90.0, 90.1, 3.0)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     element, local, inside = Locator(mesh.points, mesh.hexes()).locate(grid)
     excess = (np.linalg.norm(grid[inside, None] - BLOBS, axis=2).min(axis=1) < 9.0).astype(float)
