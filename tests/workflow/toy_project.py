@@ -52,7 +52,12 @@ def run(inputs, settings, subject):
             raise DataError(f"{{mr}}: holds NaN; export the volume again")
     failed = [a for found in inputs.stages.values() for a in found if not a.ok]
     status = {{"status": failed[0].status, "message": failed[0].message}} if failed and {name!r} == "evaluate" else {{}}
-    files = {{"report.html": b"report"}} if {name!r} == "report" else {{}}
+    from stages.tabulating.layout import TABLES
+    files = {{
+        "report": {{"report.html": b"report"}},
+        "tables": {{name: b"table" for name in ("cohort.nc", *(f"{{t.name}}.csv" for t in TABLES))}},
+        "error_vs_runtime": {{"tables/error_vs_runtime.csv": b"table"}},
+    }}.get({name!r}, {{}})
     return Fields(arrays={{"level": Array(np.full(3, settings.level), "1", "level")}}, files=files, **status)
 
 STAGE = Stage({name!r}, 1, {required!r}, Settings, run, {optional!r}, {takes_failed!r}, {folder!r})
@@ -78,7 +83,7 @@ def make_project(folder: Path) -> Path:
                 required=required,
                 optional=optional,
                 takes_failed=name in TAKES_FAILED,
-                folder="." if name == "report" else None,
+                folder="." if name in ("report", "error_vs_runtime") else None,
             )
         )
     (folder / "config/config.yaml").write_text("results: results\n")

@@ -33,6 +33,7 @@ rule tables:
         unpack(inputs_of("tables")),
     output:
         named("tables"),
+        *table_files(),
     log:
         log_of("tables"),
     benchmark:

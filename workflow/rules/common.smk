@@ -17,6 +17,7 @@ from stages.registry import (
     load_stage,
     stage_digest,
 )
+from stages.tabulating.layout import TABLES as TABLES_WRITTEN
 
 PROJECT = Path(workflow.basedir)
 
@@ -158,6 +159,14 @@ def subject_of(wildcards):
 
 def settings_of(stage):
     return stage_settings(CONFIG, stage)
+
+
+def table_files():
+    """What rule `tables` leaves beside its artefact; the readable forms of each table come with it."""
+    return [
+        str(RESULTS / "tables" / name)
+        for name in ("cohort.nc", *(f"{t.name}.csv" for t in TABLES_WRITTEN))
+    ]
 
 
 def complete_file():

@@ -33,6 +33,7 @@ rule error_vs_runtime:
         unpack(inputs_of("error_vs_runtime")),
     output:
         named("error_vs_runtime"),
+        str(RESULTS / "tables" / "error_vs_runtime.csv"),
     log:
         log_of("error_vs_runtime"),
     benchmark:
