@@ -46,7 +46,7 @@ class Settings(SettingsModel):
         default={
             "clinical1": DigitalPatient(seed=20261, both_breasts=True),
             "clinical2": DigitalPatient(seed=20262, fat_suppressed=True, monochrome1=True, unseen_views=("MLO",)),
-            "volunteer1": DigitalPatient(seed=20263, kind="volunteer"),
+            "volunteer1": DigitalPatient(seed=20264, kind="volunteer"),
         },
         description="Patients by case.",
     )

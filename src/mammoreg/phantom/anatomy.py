@@ -155,7 +155,8 @@ def _gland_volume(shape: BreastShape, depth: Volume, gland_share: float, random:
     inner = below > 1.0
     score, septa = _gland_score(shape, points[inner], ratio.ravel()[index][inner], below[inner], random)
     share = np.zeros(grid.data.size, dtype=np.float32)
-    threshold = float(np.quantile(score, 1.0 - gland_share))
+    in_front = points[inner, 1] < shape.back(points[inner, 0], points[inner, 2])
+    threshold = float(np.quantile(score[in_front], 1.0 - gland_share))
     gland = np.maximum(smooth_step(score, threshold, 0.8), SEPTUM_SHARE * septa)
     share[index[inner]] = gland
     return grid.with_data(share.reshape(grid.shape))

@@ -108,7 +108,7 @@ def project(
         pectoral: muscle that an oblique view shows.
     """
     m = np.arange(medial[0], medial[1] + SPACING_MM, SPACING_MM)
-    p = np.arange(front_p, view.edge_p_mm, SPACING_MM)
+    p = np.arange(front_p, view.edge_p_mm + SPACING_MM, SPACING_MM)
     count = int(np.ceil(view.thickness_mm / SPACING_MM))
     step = view.thickness_mm / count
     sums = np.zeros((2, view.rows, view.columns), dtype=np.float32)
