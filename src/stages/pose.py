@@ -4,16 +4,16 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.closing import COARSE, Closing
 from mammoreg.geometry import ViewGeometry, lps_to_breast
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
-from mammoreg.pose.estimate import Compressed, PoseEstimate, Tissue, estimate_pose
+from mammoreg.pose.estimate import PoseEstimate, estimate_pose
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.mechanics import Mechanics, place_breast
+from stages.mechanics import Mechanics
 from stages.methods import block_mesh
 from stages.posing.affine import affine_arrays, rigid_values
+from stages.posing.coarse import coarse_compression
 from stages.posing.seen import Seen, see_mammogram, see_second_volume
 from stages.posing.start import start_view, without_image
 from stages.posing.tissue import coarse_tissue
@@ -32,9 +32,6 @@ class Settings(SettingsModel):
     angle_bound_deg: float = Field(16.0, gt=0.0, le=45.0, description="largest offset from the header's angle, degrees")
     angle_sd_deg: float = Field(5.0, gt=0.0, le=30.0, description="standard deviation of the header's angle, degrees")
     use_density: bool = Field(True, description="let dense tissue judge the angle beside the outline")
-    thickness_shares: tuple[float, float] = Field(
-        (0.35, 0.95), description="range of an estimated thickness, as shares of the uncompressed height"
-    )
 
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
@@ -48,49 +45,25 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     else:
         return without_image(mesh, subject)
     nipple = lps_to_breast(segment.array("nipple", "mm"), subject.laterality)
-    start, estimated = start_view(seen, mesh, settings.thickness_shares)
-    if seen.placed:
-        return _fields(
-            seen, mesh, nipple, start, start, {"angle_determined": True, "angle_sd_deg": None}, estimated, ()
-        )
     mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
-    tissue = coarse_tissue(segment, mesh) if settings.use_density else None
-    found = _estimate(seen, mesh, start, settings, mu_kpa, tissue)
-    if found is None:
-        raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
-    flags = _angle_flags(found)
-    return _fields(seen, mesh, nipple, start, found.view, _search_values(found), estimated, flags)
-
-
-def _estimate(
-    seen: Seen, mesh: BlockMesh, start: ViewGeometry, settings: Settings, mu_kpa: float, tissue: Tissue | None
-) -> PoseEstimate | None:
-    mechanics = settings.mechanics
-
-    def compress(view: ViewGeometry) -> Compressed | None:
-        breast = place_breast(mesh, view.angle_deg, mechanics.model_copy(update={"gland_contrast": 1.0}), mu_kpa)
-        edge = view.edge_p_mm if mechanics.plates_end else None
-        try:
-            closing = Closing(
-                breast.model, breast.skin_quads, breast.back, edge, mechanics.lip_radius_mm, mechanics.friction, COARSE
-            )
-            closed = closing.close(view.thickness_mm)
-        except NotConvergedError:
-            return None
-        return Compressed(closed.deformed, closed.height_mm)
-
-    facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
-    return estimate_pose(
+    compress = coarse_compression(mesh, settings.mechanics, mu_kpa, plates_known=seen.placed)
+    start, estimated = start_view(seen, mesh, compress)
+    tissue = coarse_tissue(segment, mesh) if settings.use_density and not seen.placed else None
+    found = estimate_pose(
         start,
         seen.outline,
         compress,
-        facets,
-        settings.angle_step_deg,
+        skin_facets(mesh.skin_quads(), len(mesh.points), 2),
+        0.0 if seen.placed else settings.angle_step_deg,
         settings.angle_bound_deg,
         settings.angle_sd_deg,
         tissue,
         seen.density,
     )
+    if found is None:
+        raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
+    flags = () if seen.placed else _angle_flags(found)
+    return _fields(seen, mesh, nipple, start, found.view, _search_values(found, seen), estimated, flags)
 
 
 def _angle_flags(found: PoseEstimate) -> tuple[str, ...]:
@@ -98,9 +71,12 @@ def _angle_flags(found: PoseEstimate) -> tuple[str, ...]:
     return tuple(text for text, holds in doubts if holds)
 
 
-def _search_values(found: PoseEstimate) -> dict[str, Value]:
+def _search_values(found: PoseEstimate, seen: Seen) -> dict[str, Value]:
+    drawn = [seen.geometry.middle_mm - found.view.middle_mm, seen.geometry.edge_p_mm - found.view.edge_p_mm, 0.0]
     return {
-        "angle_determined": found.determined,
+        "angle_determined": found.determined or seen.placed,
+        # How far the breast was drawn over the plates: from the model's to the second volume's place, plate axes.
+        "drawn_mm": drawn if seen.placed else None,
         "angle_sd_deg": found.angle_sd_deg if np.isfinite(found.angle_sd_deg) else None,
         "coarse_rms_mm": found.alignment.rms_mm,
         "tried": [

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points, breast_to_plate, plate_rotation
@@ -58,29 +57,6 @@ def fit_scaling(
             break
     scale, offset = _scale(turned, view, heights, keep_height)
     return Scaling(np.diag(scale) @ plate_rotation(view.angle_deg), offset, heights[1] - heights[0], state)
-
-
-def fit_thickness(
-    skin: Points, quads: NDArray[np.intp], view: ViewGeometry, outline: RadialOutline, shares: tuple[float, float]
-) -> float:
-    """Plate gap, mm, at which the breast, widened alike in both directions, meets the outline best.
-
-    The paper takes it from the diameters in MR and mammogram (section II-C); so does this, from all diameters at once.
-
-    Args:
-        skin, quads, view, outline: as in `fit_scaling`; the view's thickness is not read.
-        shares: smallest and largest gap that is considered, as shares of the uncompressed height.
-    """
-    turned = breast_to_plate(skin, view.angle_deg)
-    heights = _imaged_heights(turned, view.edge_p_mm)
-    height = heights[1] - heights[0]
-
-    def misfit(share: float) -> float:
-        at = replace(view, thickness_mm=share * height)
-        return _aligned(turned, quads, at, outline, heights, keep_height=False).rms_mm
-
-    found = minimize_scalar(misfit, bounds=shares, method="bounded", options={"xatol": 0.01})
-    return float(found.x) * height
 
 
 def _imaged_heights(turned: Points, edge_p_mm: float) -> tuple[float, float]:

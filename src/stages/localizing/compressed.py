@@ -19,8 +19,8 @@ def predict_in_compressed(
 ) -> Fields:
     """Rows `compressed_rows` (LPS).
 
-    Without a mammogram the plates stand in the second volume's frame already; with one the deformed breast is only
-    shifted to that volume's outline. `rigid` is the best rigid fit of the undeformed skin to it.
+    Without a mammogram the pose was found in the second volume itself; with one the deformed breast is only shifted to
+    that volume's outline. `rigid` is the best rigid fit of the undeformed skin to it.
 
     Args:
         views: of the case.
@@ -38,18 +38,22 @@ def predict_in_compressed(
         if method == "rigid":
             carried = fit_surface_to_outline(skin, outline, rotate=True).forward(points)
         elif method in views.methods[view]:
-            carried = _carried(views.methods[view][method], view == "3D", outline, skin, points)
+            drawn = views.poses[view].value("drawn_mm") if view == "3D" else None
+            carried = _carried(views.methods[view][method], drawn, outline, skin, points)
         else:
             carried = np.full(points.shape, np.nan)
         rows += _rows(method, list(landmarks), lps_to_breast(carried, laterality))
     return Fields(values={"compressed_rows": rows})
 
 
-def _carried(way: MethodView, placed: bool, outline: Volume, skin: Points, points: Points) -> Points:
-    """Points (N, 3) between the plates, breast frame, shifted to the outline unless they are placed already."""
+def _carried(way: MethodView, drawn_mm: list[float] | None, outline: Volume, skin: Points, points: Points) -> Points:
+    """Points (N, 3) between the plates, breast frame, in the second volume's place.
+
+    The pose from that volume tells how far the breast was drawn over the plates; with a mammogram the outline does.
+    """
     angle = way.geometry.angle_deg
-    carried = plate_to_breast(way.deformation.forward(points), angle)
-    if placed:
+    carried = plate_to_breast(way.deformation.forward(points) + np.array(drawn_mm or [0.0, 0.0, 0.0]), angle)
+    if drawn_mm is not None:
         return carried
     surface = plate_to_breast(way.deformation.forward(skin), angle)
     return fit_surface_to_outline(surface, outline, rotate=False).forward(carried)

@@ -1,5 +1,6 @@
 """Where the search for a pose begins, and the pose of a case that has no image to compare with."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,45 +9,48 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.geometry.frames import plate_rotation
 from mammoreg.meshing.block import BlockMesh
-from mammoreg.pose.scaling import fit_scaling, fit_thickness
+from mammoreg.meshing.skin import skin_facets
+from mammoreg.pose.estimate import Compressed
+from mammoreg.pose.scaling import fit_scaling
+from mammoreg.pose.thickness import estimate_thickness
 from stages.contract import Array, Fields, Subject
 from stages.posing.seen import Seen
 
-GUESSED_SHARE = 0.6  # of the uncompressed height, until the thickness is estimated
 EDGE_QUANTILE = 0.25  # a plate's edge reaches in front of most, not all, of the breast's back
 
 
 def start_view(
-    seen: Seen, mesh: BlockMesh, thickness_shares: tuple[float, float]
+    seen: Seen, mesh: BlockMesh, compress: Callable[[ViewGeometry], Compressed | None]
 ) -> tuple[ViewGeometry, tuple[str, ...]]:
     """Geometry from the volume-preserving scaling at the header's angle, and the names of what was estimated.
 
     Raises:
-        DataError: the mammogram's thickness is no compression of this breast.
+        DataError: the mammogram's thickness is no compression of this breast, or cannot be estimated.
     """
     if seen.placed:
         return seen.geometry, seen.estimated
     turned = breast_to_plate(mesh.points, seen.geometry.angle_deg)
-    back = turned[mesh.back_nodes()]
     view = replace(
         seen.geometry,
-        edge_p_mm=float(np.quantile(back[:, 1], EDGE_QUANTILE)),
+        edge_p_mm=float(np.quantile(turned[mesh.back_nodes(), 1], EDGE_QUANTILE)),
         middle_mm=float(turned[:, 0].mean()),
     )
     estimated = seen.estimated
-    quads = mesh.skin_quads().astype(np.intp)
     front = turned[turned[:, 1] < view.edge_p_mm, 2]
     height = float(np.ptp(front if len(front) else turned[:, 2]))
     if not np.isfinite(view.thickness_mm):
-        view = replace(view, thickness_mm=GUESSED_SHARE * height)
-        view = replace(view, thickness_mm=fit_thickness(mesh.points, quads, view, seen.outline, thickness_shares))
+        facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
+        thickness = estimate_thickness(view, seen.outline, compress, facets, height)
+        if thickness is None:
+            raise DataError("the compressed thickness is unknown and cannot be estimated; give thickness_mm")
+        view = replace(view, thickness_mm=thickness)
         estimated = tuple(dict.fromkeys((*estimated, "thickness_mm")))
     if view.thickness_mm >= height:
         raise DataError(
             f"the compressed thickness of {view.thickness_mm:.1f} mm is not below the uncompressed breast's "
             f"{height:.1f} mm; correct thickness_mm in the views table (or the header), or check the MR volume's side"
         )
-    return fit_scaling(mesh.points, quads, view, seen.outline).alignment.view, estimated
+    return fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, seen.outline).alignment.view, estimated
 
 
 def without_image(mesh: BlockMesh, subject: Subject) -> Fields:
@@ -89,6 +93,7 @@ def without_image(mesh: BlockMesh, subject: Subject) -> Fields:
             "rows": 400,
             "columns": 300,
             "plates_known": False,
+            "drawn_mm": [0.0, 0.0, 0.0],
             "angle_determined": False,
             "estimated": ["angle_deg", "edge_p_mm", "thickness_mm"],
             "flags": [],

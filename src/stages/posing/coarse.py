@@ -1,0 +1,36 @@
+"""The coarse compression with which a pose is sought, as a function of the view."""
+
+from collections.abc import Callable
+
+from mammoreg.errors import NotConvergedError
+from mammoreg.fem.closing import COARSE
+from mammoreg.geometry import ViewGeometry
+from mammoreg.meshing.block import BlockMesh
+from mammoreg.pose.estimate import Compressed
+from stages.closing import closing_plates
+from stages.mechanics import Mechanics, place_breast
+
+
+def coarse_compression(
+    mesh: BlockMesh, mechanics: Mechanics, mu_kpa: float, *, plates_known: bool
+) -> Callable[[ViewGeometry], Compressed | None]:
+    """A function that compresses the breast at a view's angle, edge and thickness; None where it does not converge.
+
+    Args:
+        mesh: undeformed, breast frame.
+        mechanics: settings; gland and fat are alike here.
+        mu_kpa: shear modulus.
+        plates_known: the plates stand at the view's height, which a second volume shows.
+    """
+    alike = mechanics.model_copy(update={"gland_contrast": 1.0})
+
+    def compress(view: ViewGeometry) -> Compressed | None:
+        breast = place_breast(mesh, view.angle_deg, alike, mu_kpa)
+        lower_mm = view.height_mm if plates_known else None
+        try:
+            closed = closing_plates(breast, view.edge_p_mm, alike, COARSE, lower_mm).close(view.thickness_mm)
+        except NotConvergedError:
+            return None
+        return Compressed(closed.deformed, closed.height_mm)
+
+    return compress
