@@ -20,6 +20,7 @@ from mammoreg.fem.ties import PlaneTies
 LEAST_GUESS_DET = 0.2  # an affine guess that squeezes an element further is not used
 STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
 REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
+HARDER = 10.0  # a step that fails is tried again with this much more damping
 RESTLESS_MM = 1.0  # a breast that still moves further in its last step has not come to rest
 
 
@@ -140,8 +141,11 @@ class Closing:
         return plate_pair(gap_mm, middle, self.edge, self.lip)
 
     def equilibrium(self, ties: PlaneTies | None = None) -> DampedEquilibrium:
-        """The equations, with or without an outline that draws on the skin."""
-        floats = self.back.holds_height and self.lower_mm is None
+        """The equations, with or without an outline that draws on the skin.
+
+        An outline draws towards or away from the source too; the plates, whose height the image knows, stay then.
+        """
+        floats = self.back.holds_height and self.lower_mm is None and ties is None
         return DampedEquilibrium(self.model, self.back, self.contact, free_height=floats, ties=ties)
 
     def close(self, gap_mm: float) -> Closed:
@@ -207,13 +211,24 @@ class Closing:
         plates, anchors, stiff, eased = self.plates(gap_mm), self._anchors(1.0), equilibrium, state
         try:
             for factor in self.options.stiffening:
-                eased = stiff.step(eased, plates, anchors, damping, self.options.tolerance_mm)
+                eased = self._eased(stiff, eased, plates, anchors, damping)
                 stiff = equilibrium.with_contact(self.contact.stiffened(factor))
             return self._rested(stiff, eased, gap_mm, taken, cuts, STIFF_DAMPING * damping)
         except NotConvergedError:
             if not self.options.stiffening:
                 raise
         return self._rested(equilibrium, state, gap_mm, taken, cuts + 1, damping)
+
+    def _eased(
+        self, equilibrium: DampedEquilibrium, state: DampedState, plates: Sequence[Plate], anchors: Array, damping: float
+    ) -> DampedState:
+        """One step in a contact, damped harder where it fails."""
+        for factor in (damping, HARDER * damping):
+            try:
+                return equilibrium.step(state, plates, anchors, factor, self.options.tolerance_mm)
+            except NotConvergedError:
+                continue
+        return equilibrium.step(state, plates, anchors, HARDER**2 * damping, self.options.tolerance_mm)
 
     def _rested(
         self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
@@ -224,7 +239,7 @@ class Closing:
             try:
                 after = equilibrium.step(state, plates, anchors, factor, tolerance)
             except NotConvergedError:
-                cuts, factor = cuts + 1, 10.0 * factor
+                cuts, factor = cuts + 1, HARDER * factor
                 continue
             moved = float(np.abs(after.positions - state.positions).max())
             state, factor = after, 0.25 * factor
