@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
-from mammoreg.fem.closing import Closed
+from mammoreg.fem.closing import Closed, Closing
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
@@ -13,7 +13,6 @@ from mammoreg.pose.alignment import Alignment
 from mammoreg.pose.outline import radial_outline
 from mammoreg.pose.silhouette import ray_angles
 from mammoreg.shape.estimate import estimate_shape
-from stages.artefact import Artefact
 from stages.closing import resumed
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.methods import block_mesh, view_geometry
@@ -56,7 +55,11 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         settings.settled_mm,
     )
     values = {"rounds": found.rounds, **_misfit("before", found.before), **_misfit("after", found.after)}
-    values |= {"contact_drift_mm": _drift(closed, found.closed, compress), "volume_change": found.closed.volume_change}
+    values |= {
+        "contact_drift_mm": _drift(closing, closed, found.closed),
+        "penetration_mm": found.closed.penetration_mm,
+        "volume_change": found.closed.volume_change,
+    }
     lifted = found.closed.deformed + np.array([0.0, 0.0, lift_mm])
     return _fields(mesh, lifted, found.closed.state.pressure, values | {"min_det_f": found.closed.min_det_f})
 
@@ -72,13 +75,13 @@ def _misfit(when: str, state: Alignment) -> dict[str, Value]:
     }
 
 
-def _drift(before: Closed, after: Closed, compress: Artefact) -> float:
-    """Largest motion along the compression of nodes that lay on a plate, mm."""
-    low = float(before.height_mm)
-    high = low + float(compress.value("thickness_mm"))
-    height = before.deformed[:, 2]
-    touching = (height < low + 1.0) | (height > high - 1.0)
-    motion = np.abs(after.deformed[:, 2] - after.height_mm - (height - low))[touching]
+def _drift(closing: Closing, before: Closed, after: Closed) -> float:
+    """Largest motion along the compression of skin nodes that lay on the plates' flat faces, mm."""
+    skin = np.unique(closing.contact.surface.quads)
+    flat = skin if closing.edge is None else skin[before.deformed[skin, 1] < closing.edge - closing.lip]
+    height = before.deformed[flat, 2] - before.height_mm
+    touching = (height < 1.0) | (height > before.gap_mm - 1.0)
+    motion = np.abs(after.deformed[flat, 2] - after.height_mm - height)[touching]
     return float(motion.max()) if len(motion) else 0.0
 
 

@@ -59,3 +59,10 @@ def test_the_pull_on_a_face_is_stiffness_times_distance_towards_the_plane() -> N
     total = ties.force(positions).reshape(-1, 4, 3).sum(axis=1)
     expected = (ties.stiffness * ties.distance(positions))[:, None] * ties.direction
     np.testing.assert_allclose(total, expected, atol=1e-10)
+
+
+def test_parts_of_a_set_joined_again_pull_alike() -> None:
+    ties, positions = _ties()
+    some = np.array([True, False, True, True, False])
+    again = ties.kept(~some).joined(ties.kept(some))
+    np.testing.assert_allclose(_assembled(again, positions), _assembled(ties, positions))

@@ -26,10 +26,29 @@ class PlaneTies:
     offset: Array
     stiffness: Array
 
+    def kept(self, which: NDArray[np.bool_]) -> "PlaneTies":
+        """Those of the ties that a mask (T,) selects."""
+        return PlaneTies(
+            self.nodes[which], self.shape[which], self.direction[which], self.offset[which], self.stiffness[which]
+        )
+
+    def joined(self, other: "PlaneTies") -> "PlaneTies":
+        """These ties and those of another set."""
+        return PlaneTies(
+            np.concatenate([self.nodes, other.nodes]),
+            np.concatenate([self.shape, other.shape]),
+            np.concatenate([self.direction, other.direction]),
+            np.concatenate([self.offset, other.offset]),
+            np.concatenate([self.stiffness, other.stiffness]),
+        )
+
+    def points(self, positions: Array) -> Array:
+        """The tied points (T, 3) at deformed nodes (N, 3), mm."""
+        return np.asarray(np.einsum("ta,tai->ti", self.shape, positions[self.nodes]))
+
     def distance(self, positions: Array) -> Array:
         """Distance (T,) of the points from their planes at deformed nodes (N, 3), mm."""
-        points = np.einsum("ta,tai->ti", self.shape, positions[self.nodes])
-        return np.asarray(np.einsum("ti,ti->t", points, self.direction) - self.offset)
+        return np.asarray(np.einsum("ti,ti->t", self.points(positions), self.direction) - self.offset)
 
     def force(self, positions: Array) -> Array:
         """Residual (T, 12) in mN."""

@@ -6,13 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.fem.closing import Closed, Closing
+from mammoreg.fem.ties import PlaneTies
 from mammoreg.geometry import ViewGeometry
+from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import Alignment, measure
 from mammoreg.pose.outline import RadialOutline
+from mammoreg.pose.silhouette import detector_mm
 from mammoreg.shape.outline_ties import outline_ties
 
 REST_DAMPING = 0.05
+HIDDEN_MM = 0.3  # at the detector
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,8 @@ def estimate_shape(
     """Draw the silhouette onto the outline and let the body follow between the plates.
 
     The ties are renewed on the silhouette that they have made, and advanced by what they fell short of, until the
-    mean misfit is settled.
+    mean misfit is settled. Where skin that was drawn inwards has left the silhouette to other skin, it stays drawn:
+    else the two would take turns.
 
     Args:
         closing: the breast and its plates; `closed` is its result for the gap.
@@ -61,15 +66,36 @@ def estimate_shape(
     """
     before = after = measure(facets.positions(closed.deformed), facets.quads, view, outline)
     mu_kpa = float(np.average(closing.model.material.mu_kpa, weights=closing.model.volume))
-    memory = np.zeros(len(outline.theta))
-    done = 0
+    memory, held, done = np.zeros(len(outline.theta)), None, 0
+    best = (before, closed)
     while done < rounds and _mean_misfit(after) > settled_mm:
-        ties, _ = outline_ties(closed.deformed, faces, facets, view, outline, stiffness * mu_kpa, memory)
-        closed = closing.rest(closed, ties, REST_DAMPING)
+        ties, rays = outline_ties(closed.deformed, faces, facets, view, outline, stiffness * mu_kpa, memory)
+        closed = closing.rest(closed, ties if held is None else ties.joined(held), REST_DAMPING)
         after = measure(facets.positions(closed.deformed), facets.quads, view, outline)
+        hidden = _hidden(ties, rays, closed.deformed, view, outline, after)
+        inwards = ties.kept(hidden & (ties.distance(closed.deformed) > 0.0))
+        held = inwards if held is None else held.joined(inwards)
         memory = memory + np.where(after.weight > 0, np.nan_to_num(after.gap_mm), 0.0) * view.middle_magnification
+        memory[rays[hidden]] = 0.0
         done += 1
+        if _mean_misfit(after) < _mean_misfit(best[0]):
+            best = (after, closed)
+    after, closed = best
     return ShapeEstimate(closed, before, after, done)
+
+
+def _hidden(
+    ties: PlaneTies,
+    rays: NDArray[np.intp],
+    nodes: Points,
+    view: ViewGeometry,
+    outline: RadialOutline,
+    state: Alignment,
+) -> NDArray[np.bool_]:
+    """Which tied points (T,) lie within the silhouette now, because other skin makes it."""
+    inside = state.model.points()[rays] - detector_mm(ties.points(nodes), view)
+    depth = np.einsum("ti,ti->t", inside, outline.normal[rays])
+    return np.asarray(np.nan_to_num(depth) > HIDDEN_MM)
 
 
 def _mean_misfit(state: Alignment) -> float:

@@ -26,7 +26,7 @@ def outline_ties(
     outline: RadialOutline,
     stiffness_kpa: float,
     memory_mm: NDArray[np.float64] | None = None,
-) -> tuple[PlaneTies, NDArray[np.float64]]:
+) -> tuple[PlaneTies, NDArray[np.intp]]:
     """Ties at the present silhouette.
 
     Args:
@@ -39,7 +39,7 @@ def outline_ties(
         memory_mm: extra advance (K,) of each plane along its normal, mm, by which former ties fell short.
 
     Returns:
-        The ties, and the gaps (K,) that remain at the plates' middle, zero where there is none.
+        The ties, and the rays (T,) on which they are.
     """
     state = measure(facets.positions(nodes), facets.quads, view, outline)
     used = np.flatnonzero((state.weight > 0) & (state.model.edge_nodes[:, 0] >= 0))
@@ -53,13 +53,12 @@ def outline_ties(
     slope = _normal_slope(points, outline.normal[used], view)
     steep = np.linalg.norm(slope, axis=1)
     direction = slope / steep[:, None]
-    gap = np.nan_to_num(state.gap_mm) * (state.weight > 0)
-    advance = gap[used] * view.middle_magnification / steep
+    advance = np.nan_to_num(state.gap_mm[used]) * view.middle_magnification / steep
     if memory_mm is not None:
         advance = advance + memory_mm[used]
     length = _arc_length(outline)[used]
     offset = np.einsum("ti,ti->t", points, direction) + advance
-    return PlaneTies(corners, shape, direction, offset, stiffness_kpa * state.weight[used] * length), gap
+    return PlaneTies(corners, shape, direction, offset, stiffness_kpa * state.weight[used] * length), used
 
 
 def _normal_slope(points: Points, normal: NDArray[np.float64], view: ViewGeometry) -> NDArray[np.float64]:
