@@ -220,15 +220,15 @@ class Closing:
         return self._rested(equilibrium, state, gap_mm, taken, cuts + 1, damping)
 
     def _eased(
-        self, equilibrium: DampedEquilibrium, state: DampedState, plates: Sequence[Plate], anchors: Array, damping: float
+        self, contact: DampedEquilibrium, state: DampedState, plates: Sequence[Plate], anchors: Array, damping: float
     ) -> DampedState:
         """One step in a contact, damped harder where it fails."""
         for factor in (damping, HARDER * damping):
             try:
-                return equilibrium.step(state, plates, anchors, factor, self.options.tolerance_mm)
+                return contact.step(state, plates, anchors, factor, self.options.tolerance_mm)
             except NotConvergedError:
                 continue
-        return equilibrium.step(state, plates, anchors, HARDER**2 * damping, self.options.tolerance_mm)
+        return contact.step(state, plates, anchors, HARDER**2 * damping, self.options.tolerance_mm)
 
     def _rested(
         self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
