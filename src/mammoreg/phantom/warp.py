@@ -15,6 +15,8 @@ from mammoreg.phantom.shape import Array
 MAP_SPACING_MM = 1.8
 NEAR_MM = 3.0 * MAP_SPACING_MM
 FADE_MM = 20.0
+PIECE = 60000
+"""Places located at once, which bounds the memory."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +66,19 @@ class Deformed:
         counts = np.ceil((highest - lowest) / MAP_SPACING_MM).astype(int) + 1
         grid = Volume(np.zeros(tuple(counts), dtype=bool), np.asarray(lowest, dtype=float), np.full(3, MAP_SPACING_MM))
         places = grid.to_world(np.argwhere(~grid.data))
-        shift, away = self._shift(places)
+        locator = Locator(self.deformed, self.mesh.hexes)
+        pieces = [self._shift(piece, locator) for piece in np.array_split(places, 1 + len(places) // PIECE)]
+        shift, away = (np.concatenate(column) for column in zip(*pieces, strict=True))
         tables = [grid.with_data(column.reshape(grid.shape).astype(np.float32)) for column in (*shift.T, away)]
         return OriginMap(self.anatomy, (tables[0], tables[1], tables[2]), tables[3], self.nipple_motion)
 
-    def _shift(self, places: Array) -> tuple[Array, Array]:
+    def _shift(self, places: Array, locator: Locator) -> tuple[Array, Array]:
         """Origin minus place (N, 3) and the distance (N,) from the deformed breast, both in mm.
 
         The map continues linearly just outside the skin, so that the skin's place between grid points is right;
         farther away, in the chest, the motion of the nearest tissue fades.
         """
-        element, local, inside = Locator(self.deformed, self.mesh.hexes).locate(places)
+        element, local, inside = locator.locate(places)
         edge = np.clip(local, -1.0, 1.0)
         nearest = interpolate(self.mesh.hexes, element, edge, self.deformed)
         shift = interpolate(self.mesh.hexes, element, edge, self.mesh.points) - nearest
