@@ -1,5 +1,7 @@
 """Dense tissue of the MR volume, tied to the mesh, for the comparison with a mammogram."""
 
+import numpy as np
+
 from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.locate import Locator
@@ -7,7 +9,7 @@ from mammoreg.pose.estimate import Tissue
 from stages.artefact import Artefact
 
 GLAND = 2
-BLOCK = 2  # voxels a side that become one tissue point
+BLOCK_MM = 2.8  # a tissue point stands for a block of about this side; wider gaps show between the plates
 
 
 def coarse_tissue(segment: Artefact, mesh: BlockMesh) -> Tissue:
@@ -23,7 +25,9 @@ def coarse_tissue(segment: Artefact, mesh: BlockMesh) -> Tissue:
 
 def _blocks(volume: Volume) -> Volume:
     """Means over blocks of voxels; a remainder at the far end is left out."""
-    nx, ny, nz = (n // BLOCK for n in volume.shape)
-    crop = volume.data[: nx * BLOCK, : ny * BLOCK, : nz * BLOCK].astype(float)
-    means = crop.reshape(nx, BLOCK, ny, BLOCK, nz, BLOCK).mean(axis=(1, 3, 5))
-    return Volume(means, volume.origin + 0.5 * (BLOCK - 1) * volume.spacing, volume.spacing * BLOCK)
+    bx, by, bz = (max(1, round(BLOCK_MM / float(side))) for side in volume.spacing)
+    nx, ny, nz = (n // b for n, b in zip(volume.shape, (bx, by, bz), strict=True))
+    crop = volume.data[: nx * bx, : ny * by, : nz * bz].astype(float)
+    means = crop.reshape(nx, bx, ny, by, nz, bz).mean(axis=(1, 3, 5))
+    block = np.array([bx, by, bz])
+    return Volume(means, volume.origin + 0.5 * (block - 1) * volume.spacing, volume.spacing * block)
