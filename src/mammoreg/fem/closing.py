@@ -186,7 +186,13 @@ class Closing:
             NotConvergedError: with the reason.
         """
         equilibrium = self.equilibrium(ties)
-        return self._settled(equilibrium, closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
+        # Easing the contact first would unload the friction that the closing has built up.
+        stiffest = self.options.stiffening[-1] if self.options.stiffening else 1.0
+        stiff = equilibrium.with_contact(self.contact.stiffened(stiffest))
+        try:
+            return self._rested(stiff, closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
+        except NotConvergedError:
+            return self._settled(equilibrium, closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
 
     def _anchors(self, share: float) -> Array:
         anchors = self.model.points.copy()
