@@ -76,14 +76,12 @@ class Artefact:
             with h5py.File(path, "r", locking=False) as file:
                 self.attrs: dict[str, str] = {name: _text(value) for name, value in file.attrs.items()}
                 self._values = {name: json.loads(_text(node[()])) for name, node in file["values"].items()}
+            self.stage, self.case, self.message = (self.attrs[key] for key in ("stage", "case", "message"))
+            self.view = self.attrs["view"] or None
+            self.laterality = cast(Literal["L", "R"], self.attrs["laterality"])
+            self.status = cast(Status, self.attrs["status"])
         except (OSError, KeyError, ValueError) as error:
             raise ArtefactError(f"{path}: not an artefact of this pipeline; delete it and run again") from error
-        self.stage = self.attrs["stage"]
-        self.case = self.attrs["case"]
-        self.view = self.attrs["view"] or None
-        self.laterality = cast(Literal["L", "R"], self.attrs["laterality"])
-        self.status = cast(Status, self.attrs["status"])
-        self.message = self.attrs["message"]
 
     @property
     def ok(self) -> bool:

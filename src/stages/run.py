@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import platform
 import shlex
 from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
@@ -15,6 +16,8 @@ from stages.artefact import Artefact, Fields, write_artefact, write_bytes
 from stages.contract import Inputs, Stage, Subject
 from stages.errors import UserError
 from stages.registry import STAGE_MODULES, load_stage, stage_digest
+
+LIBRARIES = ("numpy", "scipy", "scikit-fem", "pypardiso", "mkl", "simpleitk", "scikit-image", "h5py")
 
 InputPaths = Mapping[str, Path | Sequence[Path]]
 
@@ -144,7 +147,8 @@ def _header(
         "view": subject.view or "",
         "laterality": subject.laterality,
         "row": json.dumps(dict(sorted(subject.row.items()))),
-        "package_version": _package_version(),
+        "package_version": _version("mammoreg"),
+        "software": json.dumps({"python": platform.python_version()} | {name: _version(name) for name in LIBRARIES}),
         "code": code,
         "settings": settings.model_dump_json(),
         "inputs": json.dumps(ids),
@@ -153,8 +157,8 @@ def _header(
     return header | {"artefact_id": hashlib.sha256(json.dumps(header).encode()).hexdigest()}
 
 
-def _package_version() -> str:
+def _version(package: str) -> str:
     try:
-        return version("mammoreg")
+        return version(package)
     except PackageNotFoundError:
         return "not installed"

@@ -15,6 +15,7 @@ def describe(artefact: Artefact) -> str:
     lines = [f"{artefact.stage} of {what}: {artefact.status}"]
     lines += [f"  {artefact.message}"] if artefact.message else []
     lines += [f"package {attrs['package_version']}, schema {attrs['schema']}, code {attrs['code'][:12]}"]
+    lines += ["software " + ", ".join(f"{k} {v}" for k, v in json.loads(attrs.get("software", "{}")).items())]
     lines += [f"frame {attrs['frame']}", f"settings {attrs['settings']}", f"row {attrs['row']}"]
     lines += ["inputs " + (", ".join(json.loads(attrs["inputs"])) or "none")]
     lines += ["arrays", *_arrays(artefact), "volumes", *_volumes(artefact), "values", *_values(artefact)]

@@ -150,6 +150,13 @@ def test_file_that_is_no_artefact(tmp_path, content):
         Artefact(path)
 
 
+def test_other_hdf5_file_is_no_artefact(tmp_path):
+    volume = xarray.Dataset({"mr": (("x",), np.ones(3))})
+    volume.to_netcdf(tmp_path / "x.h5", engine="netcdf4", group="values")
+    with pytest.raises(ArtefactError, match="not an artefact of this pipeline"):
+        Artefact(tmp_path / "x.h5")
+
+
 def test_permissions_follow_the_umask(tmp_path):
     before = os.umask(0o027)
     try:

@@ -61,6 +61,7 @@ def test_artefact_holds_result_and_where_it_comes_from(tmp_path, mr):
     assert json.loads(found.attrs["settings"]) == {"factor": 10.0, "steps": 3}
     assert json.loads(found.attrs["inputs"]) == {"mr": [content_id(mr)]}
     assert json.loads(found.attrs["row"]) == {"thickness_mm": "52.5"}
+    assert json.loads(found.attrs["software"])["numpy"] == np.__version__
     assert (found.case, found.laterality, found.view, found.stage) == ("c1", "L", None, "segment")
     assert (tmp_path / "out" / "segment" / "note.txt").read_bytes() == b"note"
 
