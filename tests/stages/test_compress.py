@@ -1,0 +1,147 @@
+"""Stage `compress`: what its settings do, and what it leaves for later stages."""
+
+import numpy as np
+import pytest
+
+from mammoreg.fem.ties import PlaneTies
+from mammoreg.geometry import breast_to_plate
+from stages.artefact import Artefact
+from stages.closing import resumed
+from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, pressed, run, write_pose, write_start
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("inputs")
+    start = write_start(folder)
+    return {"mesh": start["mesh"], "calibrate": start["calibrate"], "pose": write_pose(folder / "pose.h5")}
+
+
+@pytest.fixture(scope="module")
+def plain(inputs, tmp_path_factory):
+    return run("compress", tmp_path_factory.mktemp("compress"), inputs)
+
+
+def _with(inputs, folder, **mechanics):
+    got = run("compress", folder, inputs, {"mechanics": mechanics})
+    assert got.ok, got.message
+    return got
+
+
+def _nodes(artefact):
+    return artefact.array("deformed", "mm")
+
+
+def _reach(artefact):
+    """How far the breast comes forward between the plates, mm."""
+    return float(EDGE - _nodes(artefact)[:, 1].min())
+
+
+def test_breast_lies_between_the_plates_and_keeps_its_volume(plain):
+    assert plain.ok, plain.message
+    np.testing.assert_allclose(_nodes(plain), pressed().nodes, atol=0.01)
+    front = _nodes(plain)[_nodes(plain)[:, 1] < EDGE - 8.0]
+    heights = front[:, 2] - plain.value("height_mm")
+    assert heights.min() > -0.5
+    assert heights.max() < GAP + 0.5
+    assert abs(plain.value("volume_change")) < 0.01
+    assert plain.value("min_det_f") > 0.3
+    assert plain.value("force_lower_n") == pytest.approx(plain.value("force_upper_n"), rel=1e-3)
+    assert plain.value("uncompressed_mm") > GAP
+
+
+def test_plates_lie_where_the_pose_has_seen_them(inputs, plain, tmp_path):
+    height = pressed().view.height_mm
+    moved = run("compress", tmp_path, inputs | {"pose": write_pose(tmp_path / "p.h5", height_mm=height + 7.0)})
+    np.testing.assert_allclose(_nodes(moved) - _nodes(plain), np.tile([0.0, 0.0, 7.0], (len(MESH.points), 1)))
+    assert moved.value("lift_mm") == pytest.approx(plain.value("lift_mm") + 7.0)
+
+
+def test_known_plates_are_not_floated(inputs, plain, tmp_path):
+    height = pressed().view.height_mm
+    pose = write_pose(tmp_path / "p.h5", height_mm=height + 6.0, plates_known=True)
+    known = run("compress", tmp_path, inputs | {"pose": pose})
+    assert known.value("lift_mm") == pytest.approx(0.0, abs=1e-9)
+    back = MESH.back_nodes()
+    shift = (_nodes(known) - _nodes(plain))[:, 2]
+    assert shift[_nodes(plain)[:, 1] < EDGE - 8.0].mean() == pytest.approx(6.0, abs=0.2)
+    assert shift[back].mean() < 5.0, "the tissue behind holds the back where it was"
+    assert known.value("force_lower_n") != pytest.approx(known.value("force_upper_n"), rel=0.02)
+
+
+def test_fixed_back_stays_and_costs_force(inputs, plain, tmp_path):
+    fixed = _with(inputs, tmp_path, back="fixed")
+    free = _with(inputs, tmp_path, back="slide_plane")
+    back = MESH.back_nodes()
+    motion = {name: np.abs(_nodes(a) - _nodes(fixed))[back].max() for name, a in (("plain", plain), ("free", free))}
+    assert motion["plain"] > 0.5
+    assert fixed.value("force_n") > plain.value("force_n") > free.value("force_n")
+
+
+def test_plates_without_end_press_harder(inputs, plain, tmp_path):
+    endless = _with(inputs, tmp_path, plates_end=False)
+    assert endless.value("force_n") > 1.1 * plain.value("force_n")
+    behind = _nodes(plain)[:, 1] > EDGE
+    assert np.ptp(_nodes(endless)[behind, 2]) < np.ptp(_nodes(plain)[behind, 2]) - 5.0
+
+
+def test_friction_holds_the_skin_back(inputs, tmp_path):
+    slippery, rough = (_with(inputs, tmp_path, friction=mu) for mu in (0.0, 0.9))
+    height = _nodes(rough)[:, 2] - rough.value("height_mm")
+    held = ((height < 1.0) | (height > GAP - 1.0)) & (_nodes(rough)[:, 1] < EDGE - 8.0)
+    motion = {
+        a: np.linalg.norm((_nodes(a) - breast_to_plate(MESH.points, ANGLE))[held, :2], axis=1)
+        for a in (slippery, rough)
+    }
+    assert held.sum() >= 5
+    assert motion[rough].mean() < 0.9 * motion[slippery].mean()
+    assert rough.value("force_n") > slippery.value("force_n")
+    assert np.abs(slippery.array("contact/traction", "kPa")).max() == 0.0
+
+
+def test_fibres_along_the_nipple_axis_shorten_the_reach(inputs, tmp_path):
+    plain, stiff = (_with(inputs, tmp_path, fibre_ratio=ratio) for ratio in (0.0, 5.0))
+    assert _reach(stiff) < _reach(plain) - 0.5
+    width = {a: np.ptp(_nodes(a)[:, 0]) for a in (plain, stiff)}
+    assert width[stiff] > width[plain], "the tissue goes sideways instead"
+
+
+def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, plain, tmp_path):
+    contrasted = _with(inputs, tmp_path, gland_contrast=6.0)
+    assert contrasted.value("force_n") == pytest.approx(plain.value("force_n"), rel=0.35)
+    assert np.abs(_nodes(contrasted) - _nodes(plain)).max() > 0.2
+
+
+def test_force_scales_with_the_stiffness(inputs, plain, tmp_path):
+    soft = write_start(tmp_path, mu_kpa=4.7)["calibrate"]
+    got = run("compress", tmp_path / "out", inputs | {"calibrate": soft})
+    assert got.value("force_n") == pytest.approx(0.5 * plain.value("force_n"), rel=0.01)
+    assert np.abs(_nodes(got) - _nodes(plain)).max() < 0.05
+
+
+def test_resumed_closing_is_what_compress_left(inputs, plain):
+    artefacts = {name: Artefact(path) for name, path in inputs.items()}
+    closing, closed = resumed(artefacts["mesh"], plain, EDGE)
+    lift = np.array([0.0, 0.0, plain.value("lift_mm")])
+    np.testing.assert_allclose(closed.deformed + lift, _nodes(plain), atol=1e-12)
+    idle = PlaneTies(MESH.skin_quads()[:1], np.full((1, 4), 0.25), np.eye(3)[:1], np.zeros(1), np.zeros(1))
+    again = closing.rest(closed, idle, 0.05)
+    assert np.abs(again.deformed - closed.deformed).max() < 0.15
+    assert again.force_n == pytest.approx(closed.force_n, rel=0.02)
+    assert again.energy_mj == pytest.approx(closed.energy_mj, rel=0.01)
+
+
+def test_gap_wider_than_the_breast_is_named(inputs, tmp_path):
+    got = run("compress", tmp_path, inputs | {"pose": write_pose(tmp_path / "p.h5", thickness_mm=150.0)})
+    assert got.status == "not_converged"
+    assert "150.0 mm does not compress a breast of" in got.message
+
+
+def test_case_with_a_compression_alone_is_pressed(tmp_path):
+    start = write_start(tmp_path)
+    pose = tmp_path / "out" / "pose.3D.0.h5"
+    assert run("pose", tmp_path / "out", start, view="3D", row={"compression": "0.25"}).ok
+    chain = {"mesh": start["mesh"], "calibrate": start["calibrate"], "pose": pose}
+    got = run("compress", tmp_path / "out", chain, view="3D")
+    assert got.ok, got.message
+    assert got.value("thickness_mm") < 0.8 * np.ptp(MESH.points[:, 2])

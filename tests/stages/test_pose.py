@@ -1,0 +1,119 @@
+"""Stage `pose` on a breast that plates have pressed, whose pose is known."""
+
+import numpy as np
+import pytest
+
+from mammoreg.errors import NotConvergedError
+from mammoreg.fem.closing import Closing
+from mammoreg.geometry.frames import plate_rotation
+from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MIDDLE, ROW, pressed, run, write_mammogram, write_start
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("inputs")
+    return write_start(folder) | {"image": write_mammogram(folder / "cc.png")}
+
+
+@pytest.fixture(scope="module")
+def found(inputs, tmp_path_factory):
+    return run("pose", tmp_path_factory.mktemp("pose"), inputs, row=ROW)
+
+
+def test_pose_is_near_the_truth(found):
+    assert found.ok, found.message
+    assert found.value("angle_deg") == pytest.approx(ANGLE, abs=2.5)
+    assert found.value("header_angle_deg") == 0.0
+    assert found.value("angle_determined")
+    assert found.value("edge_p_mm") == pytest.approx(EDGE, abs=1.5)
+    assert found.value("middle_mm") == pytest.approx(MIDDLE, abs=1.0)
+    assert found.value("height_mm") == pytest.approx(pressed().view.height_mm, abs=1.0)
+    assert found.value("thickness_mm") == GAP
+    assert found.value("coarse_rms_mm") < 0.6
+
+
+def test_only_what_nobody_gave_is_marked_as_estimated(found):
+    assert set(found.value("estimated")) == {"force_n", "source_detector_mm", "support_detector_mm", "polarity"}
+
+
+def test_methods_without_mechanics_keep_the_volume_and_the_angles_of_their_own(found):
+    rigid, scaling = found.array("rigid_matrix", "1"), found.array("scaling_matrix", "1")
+    np.testing.assert_allclose(rigid, np.eye(3), atol=1e-12)
+    assert found.value("rigid_angle_deg") == 0.0
+    stretch = scaling @ plate_rotation(found.value("angle_deg")).T
+    share = stretch[2, 2]
+    np.testing.assert_allclose(stretch, np.diag([share**-0.5, share**-0.5, share]), atol=1e-9)
+    assert share == pytest.approx(GAP / 93.0, rel=0.12), "of the height that the breast has in front of the edge"
+
+
+def test_left_breast_has_the_same_pose(found, tmp_path):
+    left = write_start(tmp_path, "L") | {"image": write_mammogram(tmp_path / "cc.png", "L")}
+    other = run("pose", tmp_path / "out", left, row=ROW | {"orientation": "A\\R"}, side="L")
+    for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "rigid_edge_p_mm", "rigid_middle_mm"):
+        assert other.value(name) == pytest.approx(found.value(name), abs=1e-6), name
+
+
+def test_missing_thickness_is_estimated_and_marked(inputs, tmp_path):
+    row = {name: text for name, text in ROW.items() if name != "thickness_mm"}
+    got = run("pose", tmp_path, inputs, {"angle_step_deg": 0.0}, row=row)
+    assert got.ok, got.message
+    assert "thickness_mm" in got.value("estimated")
+    assert got.value("thickness_mm") == pytest.approx(GAP, rel=0.2)
+
+
+def test_thickness_larger_than_the_breast_fails_and_says_what_to_do(inputs, tmp_path):
+    got = run("pose", tmp_path, inputs, row=ROW | {"thickness_mm": "140"})
+    assert got.status == "failed"
+    assert "140.0 mm is not below the uncompressed breast's 9" in got.message
+    assert "correct thickness_mm" in got.message
+
+
+def test_unknown_pixel_spacing_fails_and_says_what_to_do(inputs, tmp_path):
+    row = {name: text for name, text in ROW.items() if name != "pixel_spacing_mm"}
+    got = run("pose", tmp_path, inputs, row=row)
+    assert (got.status, "give pixel_spacing_mm" in got.message) == ("failed", True)
+    assert str(tmp_path) not in got.message
+
+
+def test_step_of_zero_keeps_the_headers_angle_and_marks_it(inputs, tmp_path):
+    got = run("pose", tmp_path, inputs, {"angle_step_deg": 0.0}, row=ROW | {"angle_deg": "2"})
+    assert got.value("angle_deg") == 2.0
+    assert not got.value("angle_determined")
+    assert "angle not determined by the image" in got.value("flags")
+
+
+def test_pose_of_a_second_volume_comes_from_its_plates(tmp_path):
+    got = run("pose", tmp_path / "out", write_start(tmp_path, compressed=True), view="3D")
+    assert got.ok, got.message
+    truth = pressed().view
+    assert got.value("angle_deg") == pytest.approx(ANGLE, abs=1.0)
+    assert got.value("height_mm") == pytest.approx(truth.height_mm, abs=1.0)
+    assert got.value("thickness_mm") == pytest.approx(GAP, abs=1.5)
+    assert got.value("edge_p_mm") == pytest.approx(EDGE, abs=4.0)
+    assert got.value("plates_known")
+    assert got.array("outline", "px").shape[1] == 2
+
+
+def test_case_with_a_compression_alone(tmp_path):
+    got = run("pose", tmp_path / "out", write_start(tmp_path), view="3D", row={"compression": "0.3"})
+    assert got.ok, got.message
+    front = MESH.points[MESH.points[:, 1] < got.value("edge_p_mm"), 2]
+    assert got.value("thickness_mm") == pytest.approx(0.7 * np.ptp(front))
+    assert got.value("height_mm") + 0.5 * got.value("thickness_mm") == pytest.approx(0.5 * (front.min() + front.max()))
+    assert (got.value("angle_deg"), got.value("angle_determined")) == (0.0, False)
+    assert np.linalg.det(got.array("scaling_matrix", "1")) == pytest.approx(1.0)
+    assert not got.has("outline")
+
+
+def test_case_with_nothing_to_go_by_fails(tmp_path):
+    got = run("pose", tmp_path / "out", write_start(tmp_path), view="3D")
+    assert (got.status, "neither a mammogram" in got.message) == ("failed", True)
+
+
+def test_nothing_converges(inputs, tmp_path, monkeypatch):
+    def never(self, gap_mm):
+        raise NotConvergedError("no")
+
+    monkeypatch.setattr(Closing, "close", never)
+    got = run("pose", tmp_path, inputs, row=ROW)
+    assert (got.status, "at none of the angles" in got.message) == ("not_converged", True)
