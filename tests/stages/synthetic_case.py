@@ -90,6 +90,7 @@ def write_pose(path: Path, laterality: Laterality, view: str, flips: tuple[bool,
     placed = {name: getattr(g, name) for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")}
     values: dict[str, Any] = {**placed, **{f"rigid_{name}": value for name, value in placed.items()}}
     values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": []}
+    values |= {"drawn_mm": [0.0, 0.0, 0.0]}
     values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}
     values |= {"flip_rows": flips[0], "flip_columns": flips[1]}
     outline = _outline(view)

@@ -151,12 +151,14 @@ def test_lesion_of_a_single_voxel_keeps_its_place() -> None:
 
 def test_what_lies_behind_the_edge_is_not_seen() -> None:
     method = MethodView(turned(0.0), view(0.0, edge_p_mm=-20.0))
-    _pixels, seen = project_landmarks(method, np.array([[0.0, -21.0, 0.0], [0.0, -19.0, 0.0], [0.0, -300.0, 0.0]]))
-    assert seen.tolist() == [True, False, False]
+    _pixels, seen = project_landmarks(
+        method, np.array([[0.0, -21.0, 0.0], [0.0, -18.5, 0.0], [0.0, -17.5, 0.0], [0.0, -300.0, 0.0]])
+    )
+    assert seen.tolist() == [True, True, False, False]  # the imaged portion is known to 2 mm
     behind = project_lesion(method, body_from_sphere(np.array([0.0, -5.0, 0.0]), 8.0))
     assert behind.area is None
     assert not behind.seen
-    across = project_lesion(method, body_from_sphere(np.array([0.0, -18.0, 0.0]), 8.0))
+    across = project_lesion(method, body_from_sphere(np.array([0.0, -17.0, 0.0]), 8.0))
     assert across.area is not None
     assert not across.seen
     assert across.area.first[0] == 0

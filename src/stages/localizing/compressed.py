@@ -19,8 +19,8 @@ def predict_in_compressed(
 ) -> Fields:
     """Rows `compressed_rows` (LPS).
 
-    Without a mammogram the pose was found in the second volume itself; with one the deformed breast is only shifted to
-    that volume's outline. `rigid` is the best rigid fit of the undeformed skin to it.
+    The deformed breast is shifted to the second volume's outline; `rigid` is the best rigid fit of the undeformed
+    skin to it.
 
     Args:
         views: of the case.
@@ -49,13 +49,11 @@ def predict_in_compressed(
 def _carried(way: MethodView, drawn_mm: list[float] | None, outline: Volume, skin: Points, points: Points) -> Points:
     """Points (N, 3) between the plates, breast frame, in the second volume's place.
 
-    The pose from that volume tells how far the breast was drawn over the plates; with a mammogram the outline does.
+    The mask places the result, from where the pose has seen the breast drawn to.
     """
-    angle = way.geometry.angle_deg
-    carried = plate_to_breast(way.deformation.forward(points) + np.array(drawn_mm or [0.0, 0.0, 0.0]), angle)
-    if drawn_mm is not None:
-        return carried
-    surface = plate_to_breast(way.deformation.forward(skin), angle)
+    angle, drawn = way.geometry.angle_deg, np.array(drawn_mm or [0.0, 0.0, 0.0])
+    carried = plate_to_breast(way.deformation.forward(points) + drawn, angle)
+    surface = plate_to_breast(way.deformation.forward(skin) + drawn, angle)
     return fit_surface_to_outline(surface, outline, rotate=False).forward(carried)
 
 
