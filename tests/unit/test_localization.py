@@ -11,7 +11,6 @@ from mammoreg.localization.anatomy import clock_position
 from mammoreg.localization.deformation import AffineDeformation, MeshDeformation, MethodView, ReferenceMesh
 from mammoreg.localization.grid import BreastGrid, BreastInView
 from mammoreg.localization.lesions import LesionArea, area_from_disc, area_from_mask, body_from_mask, body_from_sphere
-from mammoreg.localization.to_compressed import fit_surface_to_outline, signed_distance
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
 from mammoreg.localization.to_mr import closest_approach, halfway, locate_in_breast
 from mammoreg.meshing.block import BlockMesh
@@ -257,50 +256,6 @@ def test_clock_facing_the_patient(step: tuple[float, float], right: str, left: s
     point = nipple + np.array([step[0], 30.0, step[1]])
     assert clock_position(point, nipple, "R") == right
     assert clock_position(point, nipple, "L") == left
-
-
-def test_signed_distance_of_a_ball() -> None:
-    distance = signed_distance(half_ball())
-    centre = distance.sample(np.array([[0.0, -30.0, 0.0]]))[0]
-    assert centre == pytest.approx(-30.0, abs=1.5)
-    assert distance.sample(np.array([[0.0, -62.0, 0.0]]))[0] == pytest.approx(2.0, abs=1.0)
-    with pytest.raises(ValueError, match="no surface"):
-        signed_distance(Volume(np.zeros((3, 3, 3)), np.zeros(3), np.ones(3)))
-
-
-def skin_points(radii: tuple[float, float, float]) -> np.ndarray:
-    """Points on a half ellipsoid in front of p = 0."""
-    golden = np.pi * (3 - np.sqrt(5.0))
-    k = np.arange(1500)
-    p = -(k + 0.5) / 1500
-    ring = np.sqrt(1 - p**2)
-    return np.stack([ring * np.cos(golden * k), p, ring * np.sin(golden * k)], axis=1) * np.array(radii)
-
-
-def ellipsoid_mask(radii: tuple[float, float, float], shift: np.ndarray, turn: np.ndarray) -> Volume:
-    axis = np.arange(-90, 91, 2.0)
-    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
-    local = (grid - shift) @ turn
-    body = np.sum((local / np.array(radii)) ** 2, axis=-1) < 1
-    return Volume(body | (local[..., 1] > 0), np.full(3, -90.0), np.full(3, 2.0))
-
-
-def test_outline_fit_recovers_a_shift() -> None:
-    radii, shift = (60.0, 70.0, 40.0), np.array([3.0, -4.0, 5.0])
-    placed = fit_surface_to_outline(
-        skin_points(radii), signed_distance(ellipsoid_mask(radii, shift, np.eye(3))), rotate=False
-    )
-    np.testing.assert_allclose(placed.matrix, np.eye(3))
-    np.testing.assert_allclose(placed.offset, shift, atol=0.4)
-
-
-def test_outline_fit_recovers_a_turn() -> None:
-    radii, shift = (60.0, 70.0, 40.0), np.array([2.0, -3.0, 4.0])
-    turn = plate_rotation(8.0)
-    points = skin_points(radii)
-    placed = fit_surface_to_outline(points, signed_distance(ellipsoid_mask(radii, shift, turn)), rotate=True)
-    inner = 0.5 * points
-    assert np.linalg.norm(placed.forward(inner) - (inner @ turn.T + shift), axis=1).max() < 1.0
 
 
 @pytest.mark.parametrize("diameter", [0.0, -1.0, float("nan")])

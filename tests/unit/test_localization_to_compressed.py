@@ -1,0 +1,60 @@
+"""Placing a surface by a body's outline, against balls and ellipsoids."""
+
+import numpy as np
+import pytest
+
+from mammoreg.geometry import Volume
+from mammoreg.geometry.frames import plate_rotation
+from mammoreg.localization.to_compressed import fit_surface_to_outline, signed_distance
+
+
+def half_ball_mask(radius: float = 60.0, spacing: float = 2.0) -> Volume:
+    """Mask of a half ball in front (p < 0) of the origin, breast frame."""
+    n = int(radius / spacing) + 2
+    axis = np.arange(-n, n + 1) * spacing
+    m, p, s = np.meshgrid(axis, axis, axis, indexing="ij")
+    return Volume((m**2 + p**2 + s**2 < radius**2) & (p <= 0), np.full(3, axis[0]), np.full(3, spacing))
+
+
+def test_signed_distance_of_a_ball() -> None:
+    distance = signed_distance(half_ball_mask())
+    centre = distance.sample(np.array([[0.0, -30.0, 0.0]]))[0]
+    assert centre == pytest.approx(-30.0, abs=1.5)
+    assert distance.sample(np.array([[0.0, -62.0, 0.0]]))[0] == pytest.approx(2.0, abs=1.0)
+    with pytest.raises(ValueError, match="no surface"):
+        signed_distance(Volume(np.zeros((3, 3, 3)), np.zeros(3), np.ones(3)))
+
+
+def skin_points(radii: tuple[float, float, float]) -> np.ndarray:
+    """Points on a half ellipsoid in front of p = 0."""
+    golden = np.pi * (3 - np.sqrt(5.0))
+    k = np.arange(1500)
+    p = -(k + 0.5) / 1500
+    ring = np.sqrt(1 - p**2)
+    return np.stack([ring * np.cos(golden * k), p, ring * np.sin(golden * k)], axis=1) * np.array(radii)
+
+
+def ellipsoid_mask(radii: tuple[float, float, float], shift: np.ndarray, turn: np.ndarray) -> Volume:
+    axis = np.arange(-90, 91, 2.0)
+    grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    local = (grid - shift) @ turn
+    body = np.sum((local / np.array(radii)) ** 2, axis=-1) < 1
+    return Volume(body | (local[..., 1] > 0), np.full(3, -90.0), np.full(3, 2.0))
+
+
+def test_outline_fit_recovers_a_shift() -> None:
+    radii, shift = (60.0, 70.0, 40.0), np.array([3.0, -4.0, 5.0])
+    placed = fit_surface_to_outline(
+        skin_points(radii), signed_distance(ellipsoid_mask(radii, shift, np.eye(3))), rotate=False
+    )
+    np.testing.assert_allclose(placed.matrix, np.eye(3))
+    np.testing.assert_allclose(placed.offset, shift, atol=0.4)
+
+
+def test_outline_fit_recovers_a_turn() -> None:
+    radii, shift = (60.0, 70.0, 40.0), np.array([2.0, -3.0, 4.0])
+    turn = plate_rotation(8.0)
+    points = skin_points(radii)
+    placed = fit_surface_to_outline(points, signed_distance(ellipsoid_mask(radii, shift, turn)), rotate=True)
+    inner = 0.5 * points
+    assert np.linalg.norm(placed.forward(inner) - (inner @ turn.T + shift), axis=1).max() < 1.0
