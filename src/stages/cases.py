@@ -170,12 +170,13 @@ def _read_rows(path: Path, model: type[AnyRow], faults: list[Fault]) -> tuple[li
         reason = error.strerror if isinstance(error, OSError) else error
         faults.append(Fault(str(path), f"cannot be read ({reason})", "give a tab-separated table in UTF-8"))
         return [], set()
-    if header_faults := _header_faults(path, lines[0] if lines else [], model):
-        faults += header_faults
+    header = lines[0] if lines else []
+    faults += _header_faults(path, header, model)
+    if _required(model) - set(header) or len(set(header)) < len(header):
         return [], set()
     filled = [(number, line) for number, line in enumerate(lines[1:], start=2) if any(line)]
-    column = lines[0].index("case")
-    found = [(number, _row(path, number, lines[0], line, model, faults)) for number, line in filled]
+    column = header.index("case")
+    found = [(number, _row(path, number, header, line, model, faults)) for number, line in filled]
     return [(n, row) for n, row in found if row], {line[column] for _, line in filled if column < len(line)}
 
 
@@ -188,10 +189,14 @@ def _header_faults(path: Path, header: Sequence[str], model: type[Row]) -> list[
             faults.append(Fault(where, f"unknown column {name!r}", f"the nearest known one is {near!r}"))
     for name in sorted({name for name in header if header.count(name) > 1}):
         faults.append(Fault(where, f"column {name!r} is there twice", "keep one of them"))
-    for name in (name for name in columns if model.model_fields[name].is_required() and name not in header):
+    for name in (name for name in columns if name in _required(model) and name not in header):
         remedy = "add it, and separate columns by tabs" if len(header) < 2 else "add it"
         faults.append(Fault(where, f"the required column {name!r} is missing", remedy))
     return faults
+
+
+def _required(model: type[Row]) -> set[str]:
+    return {name for name, info in model.model_fields.items() if info.is_required()}
 
 
 def _row(
@@ -202,7 +207,7 @@ def _row(
         what = f"{len(line)} cells under {len(header)} columns"
         faults.append(Fault(where, what, "remove the surplus, or give each cell a column"))
         return None
-    cells = {name: cell for name, cell in zip(header, line, strict=False) if cell}
+    cells = {name: cell for name, cell in zip(header, line, strict=False) if cell and name in model.model_fields}
     for name, info in model.model_fields.items():
         if name in cells and info.annotation in (Path, Path | None):
             cells[name] = os.path.normpath(path.parent / cells[name])

@@ -165,3 +165,9 @@ def test_tables_of_the_development_data(folder, cases, views):
     path = DATA / folder / "views.tsv"
     cohort = read_cohort(DATA / folder / "cases.tsv", path if path.exists() else None)
     assert (len(cohort.cases), len(cohort.mammograms)) == (cases, views)
+
+
+def test_an_unknown_column_hides_no_other_fault(tmp_path):
+    faults = _faults(tmp_path, [CASE | {"mr_lesions": "x", "laterality": "left"}])
+    assert any("unknown column 'mr_lesions'" in fault for fault in faults)
+    assert any("column laterality: 'left' is not permitted" in fault for fault in faults)
