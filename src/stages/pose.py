@@ -20,6 +20,7 @@ from stages.posing.tissue import coarse_tissue
 
 ANGLE_AT_BOUND = "angle at its bound"
 ANGLE_FROM_HEADER = "angle not determined by the image"
+NOT_DRAWN = "breast not drawn to the second volume's outline, for the coarse compression did not converge"
 
 
 class Settings(SettingsModel):
@@ -60,6 +61,9 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         tissue,
         seen.density,
     )
+    if found is None and seen.placed:
+        known: dict[str, Value] = {"angle_determined": True, "angle_sd_deg": None, "drawn_mm": [0.0, 0.0, 0.0]}
+        return _fields(seen, mesh, nipple, start, start, known, estimated, (NOT_DRAWN,))
     if found is None:
         raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
     flags = () if seen.placed else _angle_flags(found)

@@ -3,12 +3,15 @@
 from collections.abc import Callable
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.closing import COARSE
+from mammoreg.fem.closing import COARSE, ClosingOptions
 from mammoreg.geometry import ViewGeometry
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.estimate import Compressed
 from stages.closing import closing_plates
 from stages.mechanics import Mechanics, place_breast
+
+CAREFUL = ClosingOptions(steps=16, tolerance_mm=0.2)
+"""Where the coarse options do not converge."""
 
 
 def coarse_compression(
@@ -27,10 +30,12 @@ def coarse_compression(
     def compress(view: ViewGeometry) -> Compressed | None:
         breast = place_breast(mesh, view.angle_deg, alike, mu_kpa)
         lower_mm = view.height_mm if plates_known else None
-        try:
-            closed = closing_plates(breast, view.edge_p_mm, alike, COARSE, lower_mm).close(view.thickness_mm)
-        except NotConvergedError:
-            return None
-        return Compressed(closed.deformed, closed.height_mm)
+        for options in (COARSE, CAREFUL):
+            try:
+                closed = closing_plates(breast, view.edge_p_mm, alike, options, lower_mm).close(view.thickness_mm)
+            except NotConvergedError:
+                continue
+            return Compressed(closed.deformed, closed.height_mm)
+        return None
 
     return compress
