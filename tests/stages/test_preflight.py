@@ -29,7 +29,7 @@ def _faults(folder):
     return [str(fault) for fault in check_cohort(read_cohort(folder / "cases.tsv", folder / "views.tsv"))]
 
 
-def _only(folder, *parts):
+def _assert_only(folder, *parts):
     (fault,) = _faults(folder)
     for part in parts:
         assert part in fault
@@ -41,7 +41,7 @@ def test_good_cohort_has_no_fault(folder):
 
 def test_missing_file(folder):
     (folder / "mr.nii.gz").unlink()
-    _only(
+    _assert_only(
         folder,
         "cases.tsv (c1), column mr: there is no file",
         "correct the path, which is relative to the table's folder",
@@ -66,30 +66,30 @@ def test_all_missing_files_are_listed(folder):
 )
 def test_unreadable_file(folder, name, column, message):
     (folder / name).write_bytes(b"\xff\xfe\x00 rubbish")
-    _only(folder, f"column {column}: ", message)
+    _assert_only(folder, f"column {column}: ", message)
 
 
 def test_mammogram_of_another_modality(folder):
     write_dicom(folder / "cc.dcm", Modality="CR")
-    _only(folder, "views.tsv (c1 CC), column image", "modality is CR, not MG; name a mammogram")
+    _assert_only(folder, "views.tsv (c1 CC), column image", "modality is CR, not MG; name a mammogram")
 
 
 def test_mr_folder_of_another_modality(folder):
     (folder / "series").mkdir()
     write_dicom(folder / "series" / "IM1")
     _with_mr(folder, "series")
-    _only(folder, "column mr: ", "modality is MG, not MR; name the folder of one MR series")
+    _assert_only(folder, "column mr: ", "modality is MG, not MR; name the folder of one MR series")
 
 
 def test_mr_folder_without_dicom(folder):
     (folder / "series").mkdir()
     _with_mr(folder, "series")
-    _only(folder, "column mr: ", "holds no DICOM image; name the folder of one MR series")
+    _assert_only(folder, "column mr: ", "holds no DICOM image; name the folder of one MR series")
 
 
 def test_mr_that_is_a_mammogram(folder):
     _with_mr(folder, "cc.dcm")
-    _only(folder, "is neither NIfTI nor a folder; give .nii, .nii.gz or the folder of one DICOM series")
+    _assert_only(folder, "is neither NIfTI nor a folder; give .nii, .nii.gz or the folder of one DICOM series")
 
 
 def _with_mr(folder, name):
@@ -116,7 +116,9 @@ def test_lesion_mask_on_another_grid(folder):
     moved = AFFINE.copy()
     moved[0, 3] = 5.0
     write_volume(folder / "mr_lesion.nii.gz", ball(SHAPE, (5, 6, 7)), moved)
-    _only(folder, "lies on another grid (12 x 14 x 16 voxels of 1.4 x 1.4 x 1.4 mm", "resample it onto the MR grid")
+    _assert_only(
+        folder, "lies on another grid (12 x 14 x 16 voxels of 1.4 x 1.4 x 1.4 mm", "resample it onto the MR grid"
+    )
 
 
 def test_lesion_mask_with_turned_axes_is_on_the_same_grid(folder):
@@ -129,12 +131,12 @@ def test_lesion_mask_with_turned_axes_is_on_the_same_grid(folder):
 
 def test_lesion_mask_of_another_size_than_the_mammogram(folder):
     Image.fromarray(255 * ball((ROWS + 1, COLUMNS), (20, 10))).save(folder / "lesion.png")
-    _only(folder, "the mask has 41 x 30 pixels (rows x columns)", "40 x 30; draw it on the image as stored")
+    _assert_only(folder, "the mask has 41 x 30 pixels (rows x columns)", "40 x 30; draw it on the image as stored")
 
 
 def test_unknown_labels(folder):
     write_volume(folder / "mr_labels.nii.gz", np.full(SHAPE, 7, np.uint8))
-    _only(folder, "holds the labels 7; known are 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall")
+    _assert_only(folder, "holds the labels 7; known are 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall")
 
 
 def test_zero_spacing_of_the_volume(folder):
@@ -144,7 +146,7 @@ def test_zero_spacing_of_the_volume(folder):
     content[80:92] = np.array([1.4, 0.0, 1.4], "<f4").tobytes()
     path.write_bytes(bytes(content))
     write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "mr.nii"})
-    _only(folder, "the header's voxel spacing is 1.4 x 0 x 1.4 mm; correct it or export the volume again")
+    _assert_only(folder, "the header's voxel spacing is 1.4 x 0 x 1.4 mm; correct it or export the volume again")
 
 
 def test_spacing_that_is_no_breast_mr(folder):
@@ -159,24 +161,26 @@ def test_volume_that_is_one_slice(folder):
 
 def test_zero_spacing_of_the_mammogram(folder):
     write_dicom(folder / "cc.dcm", ImagerPixelSpacing=[0.0, 0.0])
-    _only(folder, "column image", "pixel_spacing_mm")
+    _assert_only(folder, "column image", "pixel_spacing_mm")
 
 
 def test_mammogram_without_spacing(folder):
     write_dicom(folder / "cc.dcm", ImagerPixelSpacing=None)
-    _only(folder, "neither header nor table gives the pixel spacing; fill the column pixel_spacing_mm")
+    _assert_only(folder, "neither header nor table gives the pixel spacing; fill the column pixel_spacing_mm")
 
 
 def test_laterality_that_contradicts_the_header(folder):
     write_dicom(folder / "cc.dcm", ImageLaterality="L")
-    _only(
+    _assert_only(
         folder, "the header's ImageLaterality is L, the table's laterality is R", "correct cases.tsv or name the image"
     )
 
 
 def test_view_that_contradicts_the_header(folder):
     write_dicom(folder / "cc.dcm", ViewPosition="MLO")
-    _only(folder, "the header's ViewPosition is MLO, the table's view is CC", "correct views.tsv or name the image")
+    _assert_only(
+        folder, "the header's ViewPosition is MLO, the table's view is CC", "correct views.tsv or name the image"
+    )
 
 
 def test_points_without_common_names(folder):
@@ -184,7 +188,9 @@ def test_points_without_common_names(folder):
     write_tsv(folder / "other.tsv", {"name": "Q1", "x": "1", "y": "2", "z": "3"})
     row = {"case": "c1", "laterality": "R", "mr": "mr.nii.gz", "mr_landmarks": "points.tsv"}
     write_tsv(folder / "cases.tsv", row | {"mr_compressed": "mr_2.nii.gz", "mr_compressed_landmarks": "other.tsv"})
-    _only(folder, "column mr_compressed_landmarks", "shares no name with", "give corresponding points the same names")
+    _assert_only(
+        folder, "column mr_compressed_landmarks", "shares no name with", "give corresponding points the same names"
+    )
 
 
 def test_excluded_rows_and_files_that_the_workflow_makes_are_not_opened(folder):

@@ -5,7 +5,7 @@ import pytest
 from scipy import ndimage
 
 from mammoreg.geometry import ViewGeometry
-from mammoreg.pose.density import DensityImage, correlation, mammogram_structure, projected_structure
+from mammoreg.pose.density import DensityImage, density_correlation, mammogram_structure, projected_structure
 
 VIEW = ViewGeometry(0.0, 0.0, 0.0, -20.0, 40.0, 650.0, 15.0, 1.0, 160, 100)
 CENTRES = np.array([[10.0, -40.0, 0.0], [-20.0, -55.0, 8.0], [15.0, -70.0, -6.0]])
@@ -49,18 +49,18 @@ def _xray(centres: np.ndarray) -> np.ndarray:
 
 def test_structure_ignores_the_scale_and_the_level_of_the_pixels() -> None:
     pixels = _speckle(0)
-    assert correlation(_structure(pixels), _structure(7.0 * pixels + 300.0)) == pytest.approx(1.0, abs=1e-4)
-    assert correlation(_structure(pixels), _structure(-pixels)) == pytest.approx(-1.0, abs=1e-4)
+    assert density_correlation(_structure(pixels), _structure(7.0 * pixels + 300.0)) == pytest.approx(1.0, abs=1e-4)
+    assert density_correlation(_structure(pixels), _structure(-pixels)) == pytest.approx(-1.0, abs=1e-4)
 
 
 def test_structure_ignores_what_varies_slowly() -> None:
     row, column = np.mgrid[0:160, 0:100]
     slope = 3.0 * row / 160.0 + 2.0 * column / 100.0
-    assert correlation(_structure(_speckle(0)), _structure(_speckle(0) + slope)) > 0.97
+    assert density_correlation(_structure(_speckle(0)), _structure(_speckle(0) + slope)) > 0.97
 
 
 def test_unrelated_tissue_does_not_correlate() -> None:
-    found = [correlation(_structure(_speckle(2 * s)), _structure(_speckle(2 * s + 1))) for s in range(1, 9)]
+    found = [density_correlation(_structure(_speckle(2 * s)), _structure(_speckle(2 * s + 1))) for s in range(1, 9)]
     assert abs(np.mean(found)) < 0.1
     assert np.abs(found).max() < 0.4
 
@@ -68,7 +68,7 @@ def test_unrelated_tissue_does_not_correlate() -> None:
 def test_what_lies_outside_the_mask_does_not_matter() -> None:
     pixels = _speckle(3)
     spoilt = np.where(_mask(), pixels, 1e4).astype(np.float32)
-    assert correlation(_structure(pixels), _structure(spoilt)) == pytest.approx(1.0, abs=1e-6)
+    assert density_correlation(_structure(pixels), _structure(spoilt)) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_rim_is_left_out_but_not_the_chest_wall_edge() -> None:
@@ -83,17 +83,17 @@ def test_projected_tissue_matches_its_own_xray_and_no_other() -> None:
     image = _structure(_xray(CENTRES))
     model = projected_structure(points, excess, VIEW, image.structure.shape)
     moved = projected_structure(points + np.array([12.0, 0.0, 0.0]), excess, VIEW, image.structure.shape)
-    assert correlation(model, image) > 0.95
-    assert correlation(moved, image) < 0.4
+    assert density_correlation(model, image) > 0.95
+    assert density_correlation(moved, image) < 0.4
 
 
 def test_too_little_overlap_has_no_correlation() -> None:
     image = _structure(_speckle(0))
     none = DensityImage(image.structure, np.zeros_like(image.mask), image.pixel_mm)
-    assert np.isnan(correlation(image, none))
+    assert np.isnan(density_correlation(image, none))
 
 
 def test_image_without_structure_has_no_correlation() -> None:
     image = _structure(_speckle(0))
     flat = DensityImage(np.zeros_like(image.structure), image.mask, image.pixel_mm)
-    assert np.isnan(correlation(image, flat))
+    assert np.isnan(density_correlation(image, flat))

@@ -11,8 +11,8 @@ import pydicom
 import pytest
 
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate
+from mammoreg.imaging.correlation import correlation
 from mammoreg.materials.attenuation import ATTENUATION_20KEV_PER_MM, attenuation_map
-from mammoreg.metrics.correlation import correlation
 from mammoreg.projection.comparison import block_mean, projection_correlation
 from mammoreg.projection.cone_beam import detector_pixels, project_volume
 from tests.shared_data import DATA, requires_shared

@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
+from mammoreg.imaging.correlation import correlation
 from mammoreg.pose.silhouette import detector_mm
 
 PIXEL_MM = 2.0
@@ -59,15 +60,10 @@ def projected_structure(
     return _structure(image, count > 0.2 * full, factor * view.pixel_mm)
 
 
-def correlation(a: DensityImage, b: DensityImage) -> float:
+def density_correlation(a: DensityImage, b: DensityImage) -> float:
     """Normalised cross-correlation of two structures where both are meaningful; nan where they hardly overlap."""
     both = a.mask & b.mask
-    if both.sum() < MIN_PIXELS:
-        return float("nan")
-    x, y = a.structure[both], b.structure[both]
-    x, y = x - x.mean(), y - y.mean()
-    norm = float(np.sqrt((x @ x) * (y @ y)))
-    return float(x @ y) / norm if norm > 0 else float("nan")
+    return correlation(a.structure, b.structure, both) if both.sum() >= MIN_PIXELS else float("nan")
 
 
 def _structure(image: NDArray[np.float64], inside: NDArray[np.bool_], pixel_mm: float) -> DensityImage:

@@ -15,7 +15,7 @@ from mammoreg.geometry.frames import Points
 from mammoreg.meshing.locate import interpolate
 from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import Alignment, align
-from mammoreg.pose.density import DensityImage, correlation, projected_structure
+from mammoreg.pose.density import DensityImage, density_correlation, projected_structure
 from mammoreg.pose.outline import RadialOutline
 
 OUTLINE_SAMPLES = 6.0  # independent pieces of information along an outline
@@ -171,7 +171,7 @@ def _density(
         return 0.0, 0.0
     points = interpolate(tissue.hexes, tissue.element, tissue.local, nodes)
     model = projected_structure(points, tissue.excess, view, mammogram.structure.shape)
-    ncc = correlation(model, mammogram)
+    ncc = density_correlation(model, mammogram)
     if not np.isfinite(ncc):
         return 0.0, 0.0
     return ncc, float(mammogram.mask.sum()) * (mammogram.pixel_mm / PATCH_MM) ** 2

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.metrics.correlation import correlation
+from mammoreg.imaging.correlation import correlation
 from mammoreg.projection.cone_beam import Image
 
 BREAST = 1
