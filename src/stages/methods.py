@@ -7,11 +7,18 @@ import numpy as np
 from mammoreg.geometry import ViewGeometry, lps_to_breast
 from mammoreg.localization.deformation import AffineDeformation, MeshDeformation, MethodView, ReferenceMesh
 from mammoreg.meshing.block import BlockMesh
+from mammoreg.pose.outline import RadialOutline, radial_outline
+from mammoreg.pose.silhouette import pixels_at_detector, ray_angles
 from stages.artefact import Artefact
 
 AFFINE_METHODS = ("rigid", "scaling")
 MESH_METHODS = {"plate": "compress", "updated": "solve"}
 METHODS = (*AFFINE_METHODS, *MESH_METHODS)
+
+OUTLINE_RAYS = 181
+"""Rays on which a model is brought onto an outline."""
+FINE_RAYS = 721
+"""Rays on which results are measured and drawn."""
 
 _OF_METHOD = ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")
 _OF_VIEW = ("source_detector_mm", "support_detector_mm", "pixel_mm")
@@ -34,6 +41,12 @@ def view_geometry(pose: Artefact, method: str | None = None) -> ViewGeometry:
     shared = {name: float(pose.value(name)) for name in _OF_VIEW}
     rows, columns = int(pose.value("rows")), int(pose.value("columns"))
     return ViewGeometry(**placed, **shared, rows=rows, columns=columns, parallel=parallel)
+
+
+def pose_outline(pose: Artefact, rays: int = OUTLINE_RAYS) -> RadialOutline:
+    """The outline in a view's image on rays, mm at the detector."""
+    points = pixels_at_detector(pose.array("outline", "px"), view_geometry(pose))
+    return radial_outline(points, pose.array("outline_weight", "1"), ray_angles(rays))
 
 
 def block_mesh(mesh: Artefact) -> BlockMesh:

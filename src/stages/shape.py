@@ -10,13 +10,10 @@ from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.alignment import Alignment
-from mammoreg.pose.outline import radial_outline
-from mammoreg.pose.silhouette import ray_angles
 from mammoreg.shape.estimate import estimate_shape
 from stages.closing import resumed
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.methods import block_mesh, view_geometry
-from stages.posing.seen import RAYS, at_detector
+from stages.methods import block_mesh, pose_outline, view_geometry
 
 
 class Settings(SettingsModel):
@@ -37,9 +34,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     if not pose.has("outline"):
         return _fields(mesh, compress.array("deformed", "mm"), compress.array("pressure", "kPa"), {"rounds": 0})
     view, lift_mm = view_geometry(pose), float(compress.value("lift_mm"))
-    outline = radial_outline(
-        at_detector(pose.array("outline", "px"), view), pose.array("outline_weight", "1"), ray_angles(RAYS)
-    )
+    outline = pose_outline(pose)
     closing, closed = resumed(mesh_file, compress, view.edge_p_mm)
     facets = skin_facets(mesh.skin_quads(), len(mesh.points), settings.facets)
     floating = replace(view, height_mm=view.height_mm - lift_mm)

@@ -9,6 +9,7 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate
 from mammoreg.pose.outline import RadialOutline, radial_outline
 from mammoreg.pose.plates import PlatePair
+from mammoreg.pose.silhouette import pixels_at_detector
 
 PARALLEL_MM = 1.0e7  # a source this far away casts parallel beams
 PIXEL_MM = 0.7
@@ -64,9 +65,7 @@ def outline_of_mask(mask: Volume, view: ViewGeometry, theta: NDArray[np.float64]
     largest = 1 + int(np.argmax(ndimage.sum_labels(shadow > 0.5, labels, np.arange(1, count + 1))))
     kept = np.where((labels == largest) | (shadow <= 0.5), shadow, 0.0)
     contour = max(find_contours(np.pad(kept, ((1, 1), (0, 1))), 0.5), key=len) - np.array([1.0, 0.0])
-    points = np.stack(
-        [(contour[:, 1] + 0.5) * view.pixel_mm, (contour[:, 0] - 0.5 * (view.rows - 1)) * view.pixel_mm], axis=-1
-    )
+    points = pixels_at_detector(contour[:, ::-1], view)
     if points[0, 1] > points[-1, 1]:
         points = points[::-1]
     return radial_outline(points, np.clip(points[:, 0] / FADE_MM, 0.0, 1.0), theta)

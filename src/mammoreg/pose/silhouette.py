@@ -48,7 +48,11 @@ def polar_to_detector(
 
 def detector_mm(points: Points, view: ViewGeometry) -> NDArray[np.float64]:
     """Project points (..., 3) of the plate frame to (..., 2) forward of the edge and along it, mm at the detector."""
-    pixels = view.project(points)
+    return pixels_at_detector(view.project(points), view)
+
+
+def pixels_at_detector(pixels: NDArray[np.float64], view: ViewGeometry) -> NDArray[np.float64]:
+    """Canonical pixels (..., 2) as (column, row) to (..., 2) forward of the edge and along it, mm at the detector."""
     forward = (pixels[..., 0] + 0.5) * view.pixel_mm
     along = (pixels[..., 1] - 0.5 * (view.rows - 1)) * view.pixel_mm
     return np.stack([forward, along], axis=-1)

@@ -11,9 +11,9 @@ from mammoreg.metrics.elongation import Direction, extents_mm
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
 from stages.artefact import Artefact
-from stages.evaluating.fit import has_outline, pose_outline
+from stages.evaluating.fit import has_outline
 from stages.evaluating.predictions import Row
-from stages.methods import view_geometry
+from stages.methods import FINE_RAYS, pose_outline, view_geometry
 
 _METHODS = ("scaling", "plate", "updated")
 
@@ -26,7 +26,7 @@ def elongation_rows(pose: Artefact, block: BlockMesh, methods: Mapping[str, Meth
     """
     if not has_outline(pose):
         return []
-    geometry, outline = view_geometry(pose), pose_outline(pose)
+    geometry, outline = view_geometry(pose), pose_outline(pose, FINE_RAYS)
     standing = replace(geometry, parallel=True)
     before = _extents(outline, breast_to_plate(block.points, geometry.angle_deg), block, standing)
     true = extents_mm(outline.points(), outline.theta, outline.weight)

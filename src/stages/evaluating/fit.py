@@ -3,19 +3,16 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from mammoreg.geometry import ViewGeometry
 from mammoreg.localization.deformation import MethodView
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.metrics.outline_fit import outline_fit
-from mammoreg.pose.outline import RadialOutline, radial_outline
-from mammoreg.pose.silhouette import detector_mm, ray_angles
+from mammoreg.pose.outline import RadialOutline
+from mammoreg.pose.silhouette import detector_mm
 from stages.artefact import Artefact
 from stages.evaluating.predictions import Row
-from stages.methods import MESH_METHODS, of_view, view_geometry
+from stages.methods import FINE_RAYS, MESH_METHODS, of_view, pose_outline
 
-_RAYS = 721
 SULLIVAN_N = (49.0, 186.0)
 """Range of compression forces measured by Sullivan et al. (paper, section II-B)."""
 
@@ -40,15 +37,6 @@ def has_outline(pose: Artefact) -> bool:
     return "outline" in pose.names()
 
 
-def pose_outline(pose: Artefact) -> RadialOutline:
-    """The outline in the image on rays, mm at the detector."""
-    geometry = view_geometry(pose)
-    pixels = pose.array("outline", "px")
-    forward = (pixels[:, 0] + 0.5) * geometry.pixel_mm
-    along = (pixels[:, 1] - 0.5 * (geometry.rows - 1)) * geometry.pixel_mm
-    return radial_outline(np.stack([forward, along], axis=1), pose.array("outline_weight", "1"), ray_angles(_RAYS))
-
-
 def fit_rows(
     pose: Artefact,
     block: BlockMesh,
@@ -63,7 +51,7 @@ def fit_rows(
         results: artefacts of `compress`, `solve` and `project`.
         beam_gaps: largest gap of the beams to a lesion, by method.
     """
-    outline, view = pose_outline(pose) if has_outline(pose) else None, str(pose.view)
+    outline, view = pose_outline(pose, FINE_RAYS) if has_outline(pose) else None, str(pose.view)
     rows = []
     for method, way in methods.items():
         solution = of_view([a for a in results if a.stage == MESH_METHODS.get(method)], view)

@@ -11,8 +11,7 @@ from mammoreg.plots.style import Png
 from mammoreg.plots.tissues import segmentation
 from mammoreg.pose.silhouette import detector_mm
 from stages.artefact import Artefact
-from stages.evaluating.fit import pose_outline
-from stages.methods import MESH_METHODS
+from stages.methods import FINE_RAYS, MESH_METHODS, pose_outline
 from stages.picturing.case import BEST_FIRST, PicturedCase, first_of
 from stages.picturing.images import mammogram
 
@@ -29,7 +28,7 @@ def outlines(case: PicturedCase) -> Png | None:
 def _view_outlines(case: PicturedCase, view: str) -> ViewOutlines:
     assert case.block is not None
     pose = case.poses[view]
-    outline = pose_outline(pose)
+    outline = pose_outline(pose, FINE_RAYS)
     models = {}
     for name, way in case.methods[view].items():
         projected = detector_mm(way.deformation.forward(case.block.points), way.geometry)

@@ -15,11 +15,11 @@ from mammoreg.pose.density import DensityImage, mammogram_structure
 from mammoreg.pose.outline import RadialOutline, radial_outline
 from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
-from mammoreg.pose.silhouette import ray_angles
+from mammoreg.pose.silhouette import pixels_at_detector, ray_angles
 from stages.contract import Array, Subject, Value
+from stages.methods import OUTLINE_RAYS
 from stages.readers.mammogram import read_mammogram
 
-RAYS = 181
 TISSUE_CODES = "0 air, 1 breast, 2 pectoral muscle"
 
 
@@ -85,7 +85,9 @@ def see_mammogram(path: Path, subject: Subject, view: View) -> Seen:
     breast = found.mask if found.pectoral is None else found.mask & ~found.pectoral
     return Seen(
         geometry=geometry,
-        outline=radial_outline(at_detector(found.outline, geometry), found.outline_weight, ray_angles(RAYS)),
+        outline=radial_outline(
+            pixels_at_detector(found.outline, geometry), found.outline_weight, ray_angles(OUTLINE_RAYS)
+        ),
         placed=False,
         density=mammogram_structure(image.pixels, breast, facts.pixel_mm),
         nipple=found.nipple,
@@ -108,7 +110,7 @@ def see_second_volume(mask: Volume) -> Seen:
     """Plates and silhouette of a second MR volume's body mask (breast frame)."""
     plates = find_plates(mask)
     geometry = parallel_view(mask, plates)
-    outline = outline_of_mask(mask, geometry, ray_angles(RAYS))
+    outline = outline_of_mask(mask, geometry, ray_angles(OUTLINE_RAYS))
     points = outline.points()
     known = np.isfinite(points).all(axis=1)
     pixels = np.stack(
@@ -120,13 +122,6 @@ def see_second_volume(mask: Volume) -> Seen:
     }
     values: dict[str, Value] = {"contact_mm2": list(plates.contact_mm2)}
     return Seen(geometry, outline, placed=True, arrays=arrays, values=values)
-
-
-def at_detector(pixels: NDArray[np.float64], view: ViewGeometry) -> NDArray[np.float64]:
-    """Canonical pixels (M, 2) as (forward, along), mm at the detector."""
-    forward = (pixels[:, 0] + 0.5) * view.pixel_mm
-    along = (pixels[:, 1] - 0.5 * (view.rows - 1)) * view.pixel_mm
-    return np.stack([forward, along], axis=-1)
 
 
 def _image_arrays(image: CanonicalMammogram, found: MammogramAnalysis) -> dict[str, Array]:
