@@ -12,14 +12,16 @@ from stages.artefact import Artefact
 from stages.contract import Array, Value
 from stages.mechanics import Mechanics, PlacedBreast, place_breast
 from stages.methods import block_mesh
+from stages.tissue_map import kept_gland_share
 
 _MEMORY = {"anchor": "mm", "traction": "kPa", "pressure": "kPa"}
 
 
-def placed_breast(mesh: Artefact, angle_deg: float, mechanics: Mechanics, mu_kpa: float) -> PlacedBreast:
-    """The breast of a mesh artefact, turned to a projection angle."""
-    gland = mesh.array("gland_fraction", "1") if mechanics.gland_contrast != 1.0 else None
-    return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland)
+def placed_again(mesh: Artefact, compress: Artefact) -> PlacedBreast:
+    """The breast as `compress` had it before the plates closed."""
+    mechanics = Mechanics.model_validate(compress.value("mechanics"))
+    angle_deg, mu_kpa = float(compress.value("angle_deg")), float(compress.value("mu_kpa"))
+    return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, kept_gland_share(compress))
 
 
 def closing_plates(
@@ -66,7 +68,7 @@ def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closi
     """The plates and the breast between them as `compress` left them, in the floating breast's own height."""
     mechanics = Mechanics.model_validate(compress.value("mechanics"))
     options = replace(ClosingOptions(), **_options(compress.value("options")))
-    breast = placed_breast(mesh, compress.value("angle_deg"), mechanics, compress.value("mu_kpa"))
+    breast = placed_again(mesh, compress)
     closing = closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))
     lift = np.array([0.0, 0.0, compress.value("lift_mm")])
     memory = SoftMemory(**{name: compress.array(f"contact/{name}", units) for name, units in _MEMORY.items()})

@@ -6,10 +6,11 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.fem.closing import Closed, ClosingOptions
-from stages.closing import closing_plates, kept_arrays, kept_values, placed_breast
+from stages.closing import closing_plates, kept_arrays, kept_values
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.mechanics import Mechanics
-from stages.methods import view_geometry
+from stages.mechanics import Mechanics, place_breast
+from stages.methods import block_mesh, view_geometry
+from stages.tissue_map import gland_share, gland_share_array
 
 
 class Settings(SettingsModel):
@@ -35,7 +36,9 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         tolerance_mm=settings.tolerance_mm,
         penalty_per_mm=settings.penalty_per_mm,
     )
-    breast = placed_breast(inputs.artefact("mesh"), view.angle_deg, settings.mechanics, mu_kpa)
+    gland = gland_share(inputs) if settings.mechanics.tells_gland_from_fat else None
+    mesh = block_mesh(inputs.artefact("mesh"))
+    breast = place_breast(mesh, view.angle_deg, settings.mechanics, mu_kpa, gland)
     closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options, lower_mm)
     closed = closing.close(view.thickness_mm)
     # The floating breast is placed where the pose has seen the plates.
@@ -46,6 +49,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame"),
             "residuals": Array(np.array(closed.residuals), "1", "unbalanced over internal forces, each iteration"),
             **kept_arrays(closed),
+            **gland_share_array(gland),
         },
         values={
             **solve_report(closed),
@@ -78,4 +82,11 @@ def solve_report(closed: Closed) -> dict[str, Value]:
     }
 
 
-STAGE = Stage(name="compress", schema=1, inputs=("mesh", "pose", "calibrate"), settings=Settings, run=run)
+STAGE = Stage(
+    name="compress",
+    schema=2,
+    inputs=("mesh", "pose", "calibrate"),
+    optional=("segment",),
+    settings=Settings,
+    run=run,
+)

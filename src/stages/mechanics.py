@@ -55,6 +55,11 @@ class Mechanics(SettingsModel):
         description="soft tissue between the model's back and the chest wall, which shears as the back slides, mm",
     )
 
+    @property
+    def tells_gland_from_fat(self) -> bool:
+        """Whether the material needs the tissue map."""
+        return self.gland_contrast != 1.0
+
 
 @dataclass(frozen=True)
 class PlacedBreast:
@@ -81,11 +86,16 @@ def place_breast(
         angle_deg: projection angle.
         mechanics: settings.
         mu_kpa: shear modulus of the homogeneous tissue, the volume's mean where gland differs from fat.
-        gland: share of gland per element (E,), asked for where `gland_contrast` is not 1.
+        gland: share of gland per element (E,), where the material tells gland from fat.
+
+    Raises:
+        ValueError: the material tells gland from fat and their shares are not given.
     """
     points = breast_to_plate(mesh.points, angle_deg)
     mu: float | Floats = mu_kpa
-    if mechanics.gland_contrast != 1.0 and gland is not None:
+    if mechanics.tells_gland_from_fat:
+        if gland is None:
+            raise ValueError("a material that tells gland from fat needs the share of gland in each element")
         relative = 1.0 + (mechanics.gland_contrast - 1.0) * gland
         mu = mu_kpa * relative / float(relative.mean())
     fibre = fibre_kpa = None

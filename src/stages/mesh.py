@@ -1,15 +1,13 @@
-"""Stage `mesh`: the breast as a block of hexahedra, with its quality and the gland's share in each element."""
+"""Stage `mesh`: the breast as a block of hexahedra, with its quality."""
 
 import numpy as np
 from pydantic import Field
 
 from mammoreg.geometry import lps_to_breast
 from mammoreg.meshing.breast import BreastMesh, build_mesh
-from mammoreg.meshing.fractions import tissue_fraction
 from mammoreg.meshing.quality import MeshQuality
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 
-_FAT, _GLAND, _SKIN = 1, 2, 3
 # In a left breast LPS mirrors the block: swapping the ends of its first axis makes the elements right-handed again.
 _MIRRORED_ORDER = [1, 0, 3, 2, 5, 4, 7, 6]
 
@@ -27,16 +25,13 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Mesh the segmented breast."""
     side = subject.laterality
     segment = inputs.artefact("segment")
-    mask, labels = (segment.volume(name).between_lps_and_breast(side) for name in ("breast_mask", "labels"))
+    mask = segment.volume("breast_mask").between_lps_and_breast(side)
     back, nipple = (lps_to_breast(segment.array(name, "mm"), side) for name in ("chest_wall_surface", "nipple"))
     built = build_mesh(mask, back, nipple, settings.elements)
     hexes = built.mesh.hexes()
     arrays = {
         "points": Array(lps_to_breast(built.mesh.points, side), "mm", "nodes of the block, first axis to medial"),
         "hexes": Array(hexes[:, _MIRRORED_ORDER] if side == "L" else hexes, "1", "nodes of each hexahedron, VTK order"),
-        "gland_fraction": Array(
-            tissue_fraction(built.mesh, labels, _GLAND, (_FAT, _GLAND, _SKIN)), "1", "gland's share of each hexahedron"
-        ),
     }
     return Fields(arrays=arrays, values=_values(built, settings))
 
@@ -64,4 +59,4 @@ def _warnings(quality: MeshQuality, settings: Settings) -> list[str]:
     return [f"{what} {found:.3g}, above {limit:g}" for found, limit, what in checks if not np.less_equal(found, limit)]
 
 
-STAGE = Stage(name="mesh", schema=1, inputs=("segment",), settings=Settings, run=run)
+STAGE = Stage(name="mesh", schema=2, inputs=("segment",), settings=Settings, run=run)

@@ -5,9 +5,8 @@ from pydantic import Field
 
 from mammoreg.fem.equilibrium import NewtonOptions
 from mammoreg.fem.prescribed import PrescribedOptions, PrescribedResult, solve_prescribed
-from stages.closing import placed_breast
+from stages.closing import placed_again
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.mechanics import Mechanics
 
 
 class Settings(SettingsModel):
@@ -20,11 +19,9 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Prescribe the estimated surface and solve the interior; the back keeps the condition of `compress`."""
     compress, shape = inputs.artefact("compress"), inputs.artefact("shape")
-    mechanics = Mechanics.model_validate(compress.value("mechanics"))
-    angle_deg, mu_kpa = float(compress.value("angle_deg")), float(compress.value("mu_kpa"))
     # The back's springs know the floating breast, not where the pose has lifted it to.
     lift = np.array([0.0, 0.0, float(compress.value("lift_mm"))])
-    breast = placed_breast(inputs.artefact("mesh"), angle_deg, mechanics, mu_kpa)
+    breast = placed_again(inputs.artefact("mesh"), compress)
     solved = solve_prescribed(
         breast.model,
         shape.array("skin_nodes", "1"),

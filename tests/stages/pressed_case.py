@@ -100,10 +100,7 @@ def write_start(
         volumes={n: VolumeField(v.between_lps_and_breast(laterality), "1", n) for n, v in volumes.items()},
     )
     write_artefact(found["segment"], header("segment", laterality), segment)
-    arrays = {
-        "points": Array(lps_to_breast(MESH.points, laterality), "mm", "nodes"),
-        "gland_fraction": Array(np.linspace(0.0, 0.6, len(MESH.hexes())), "1", "gland"),
-    }
+    arrays = {"points": Array(lps_to_breast(MESH.points, laterality), "mm", "nodes")}
     write_artefact(found["mesh"], header("mesh", laterality), Fields(arrays=arrays, values={"n": MESH.n}))
     write_artefact(found["calibrate"], header("calibrate", "R"), Fields(values={"mu_kpa": mu_kpa}))
     return found

@@ -5,8 +5,10 @@ import pytest
 
 from mammoreg.fem.ties import PlaneTies
 from mammoreg.geometry import breast_to_plate
+from stages import tissue_map
 from stages.artefact import Artefact
 from stages.closing import resumed
+from stages.errors import UserError
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, pressed, run, write_pose, write_start
 
 
@@ -20,6 +22,11 @@ def inputs(tmp_path_factory):
 @pytest.fixture(scope="module")
 def plain(inputs, tmp_path_factory):
     return run("compress", tmp_path_factory.mktemp("compress"), inputs)
+
+
+@pytest.fixture(scope="module")
+def segment(tmp_path_factory):
+    return write_start(tmp_path_factory.mktemp("segment"))["segment"]
 
 
 def _with(inputs, folder, **mechanics):
@@ -106,10 +113,25 @@ def test_fibres_along_the_nipple_axis_shorten_the_reach(inputs, tmp_path):
     assert width[stiff] > width[plain], "the tissue goes sideways instead"
 
 
-def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, plain, tmp_path):
-    contrasted = _with(inputs, tmp_path, gland_contrast=6.0)
+def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, segment, plain, tmp_path):
+    contrasted = _with(inputs | {"segment": segment}, tmp_path, gland_contrast=6.0)
     assert contrasted.value("force_n") == pytest.approx(plain.value("force_n"), rel=0.35)
     assert np.abs(_nodes(contrasted) - _nodes(plain)).max() > 0.2
+
+
+def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain, tmp_path, monkeypatch):
+    told = inputs | {"segment": segment}
+    with monkeypatch.context() as patch:
+        patch.setattr(tissue_map, "tissue_fraction", lambda *_: pytest.fail("made for homogeneous tissue"))
+        alike = run("compress", tmp_path, told)
+    np.testing.assert_array_equal(_nodes(alike), _nodes(plain))
+    assert "gland_fraction" not in alike.names()
+    share = _with(told, tmp_path, gland_contrast=2.0).array("gland_fraction", "1")
+    assert len(share) == len(MESH.hexes())
+    assert share.min() == 0.0
+    assert share.max() > 0.3
+    with pytest.raises(UserError, match="needs the input segment"):
+        _with(inputs, tmp_path, gland_contrast=2.0)
 
 
 def test_force_scales_with_the_stiffness(inputs, plain, tmp_path):

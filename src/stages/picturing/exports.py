@@ -14,6 +14,7 @@ from stages.marks import canonical_pixels
 from stages.methods import MESH_METHODS
 from stages.picturing.case import PicturedCase
 from stages.picturing.file_formats import mask_png, mr_grid, nifti_bytes, on_grid, volume_affine, vtu_bytes
+from stages.tissue_map import GLAND_SHARE, kept_gland_share
 
 _DISPLACEMENT_INTENT = 1006
 _OUTSIDE_MM = 0.0
@@ -36,10 +37,10 @@ def case_exports(case: PicturedCase) -> dict[str, bytes]:
     Returns:
         Contents by file name; empty where not even the mesh exists.
     """
-    mesh, block = case.ok("mesh"), case.block
-    if mesh is None or block is None:
+    block = case.block
+    if block is None:
         return {}
-    files = {"README.txt": README.encode(), "mesh.vtu": _undeformed_mesh(mesh, block)}
+    files = {"README.txt": README.encode(), "mesh.vtu": _undeformed_mesh(case, block)}
     files |= _lesion_names(case) | _lesions_in_mr(case) | _lesions_in_mammograms(case)
     solved = {view: [m for m in MESH_METHODS if m in case.methods[view]] for view in case.poses}
     for view, methods in solved.items():
@@ -102,10 +103,12 @@ def _carried(case: PicturedCase, view: str, method: str, points: Points) -> Poin
     return lps_to_breast(plate_to_breast(placed, way.geometry.angle_deg), case.laterality)
 
 
-def _undeformed_mesh(mesh: Artefact, block: BlockMesh) -> bytes:
-    """The undeformed mesh, LPS, with the share of gland in each element where the mesh knows it."""
-    shares = {"gland_fraction": [mesh.array("gland_fraction", "1")]} if mesh.has("gland_fraction") else {}
-    return vtu_bytes(lps_to_breast(block.points, mesh.laterality), lps_hexes(block, mesh.laterality), {}, shares)
+def _undeformed_mesh(case: PicturedCase, block: BlockMesh) -> bytes:
+    """The undeformed mesh, LPS, with the share of gland in each element where a material asked for it."""
+    compress = case.ok("compress")
+    gland = kept_gland_share(compress) if compress is not None else None
+    shares = {} if gland is None else {GLAND_SHARE: [gland]}
+    return vtu_bytes(lps_to_breast(block.points, case.laterality), lps_hexes(block, case.laterality), {}, shares)
 
 
 def _deformed_mesh(case: PicturedCase, block: BlockMesh, view: str, method: str) -> bytes:
