@@ -11,11 +11,11 @@ from mammoreg.contact.soft import SoftContact, plate_pair, touching
 from mammoreg.contact.surface import ContactSurface, Rule
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
-from mammoreg.fem.damped import DampedEquilibrium, DampedState
+from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
 from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.parts import Part, all_nodes
 from mammoreg.fem.predictor import affine_predictor
 from mammoreg.fem.sparse import Array
-from mammoreg.fem.ties import PlaneTies
 
 LEAST_GUESS_DET = 0.2  # an affine guess that squeezes an element further is not used
 STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
@@ -74,6 +74,7 @@ class Closed:
         penetration_mm: deepest contact point inside a plate.
         energy_mj: isochoric strain energy.
         state: to go on from.
+        extra: extra nodes (M, 3), mm, or None.
     """
 
     deformed: Array
@@ -90,6 +91,7 @@ class Closed:
     penetration_mm: float
     energy_mj: float
     state: DampedState
+    extra: Array | None = None
 
 
 class Closing:
@@ -105,6 +107,9 @@ class Closing:
         options: numerical settings.
         lower_mm: height of the lower plate's face in the end, where it is known; else the plates' common height
             floats, so that the back carries no net force along the compression.
+        parts: what acts beside elements, back and plates.
+        extra_nodes: undeformed nodes (M, 3) beside the body's, mm, numbered behind them; `skin_quads`, `back` and
+            `parts` may name them.
     """
 
     def __init__(
@@ -117,16 +122,19 @@ class Closing:
         friction: float = 0.0,
         options: ClosingOptions | None = None,
         lower_mm: float | None = None,
+        parts: Sequence[Part] = (),
+        extra_nodes: Array | None = None,
     ) -> None:
         self.model, self.back, self.edge, self.lip = model, back, edge_p_mm, lip_radius_mm
-        self.lower_mm = lower_mm
+        self.lower_mm, self.parts, self.extra_nodes = lower_mm, tuple(parts), extra_nodes
+        self.points = all_nodes(model.points, extra_nodes)
         self.options = options if options is not None else ClosingOptions()
         mu = float(np.average(model.material.mu_kpa, weights=model.volume))
-        surface = ContactSurface(model.points, skin_quads, self.options.rule)
+        surface = ContactSurface(self.points, skin_quads, self.options.rule)
         stiffness = self.options.penalty_per_mm * mu
         self.contact = SoftContact(surface, stiffness, self.options.band_mm, friction, self.options.slip_mm)
-        self.predictor = affine_predictor(model.points, back)
-        self.low, self.high = touching(surface.positions(model.points).reshape(-1, 3), edge_p_mm, lip_radius_mm)
+        self.predictor = affine_predictor(self.points, back, len(model.points))
+        self.low, self.high = touching(surface.positions(self.points).reshape(-1, 3), edge_p_mm, lip_radius_mm)
 
     @property
     def uncompressed_mm(self) -> float:
@@ -140,13 +148,16 @@ class Closing:
             middle += share * (self.lower_mm + 0.5 * gap_mm - middle)
         return plate_pair(gap_mm, middle, self.edge, self.lip)
 
-    def equilibrium(self, ties: PlaneTies | None = None) -> DampedEquilibrium:
+    def equilibrium(self, outline: Part | None = None) -> DampedEquilibrium:
         """The equations, with or without an outline that draws on the skin.
 
         An outline draws towards or away from the source too; the plates, whose height the image knows, stay then.
         """
-        floats = self.back.holds_height and self.lower_mm is None and ties is None
-        return DampedEquilibrium(self.model, self.back, self.contact, free_height=floats, ties=ties)
+        floats = self.back.holds_height and self.lower_mm is None and outline is None
+        parts = self.parts if outline is None else (*self.parts, outline)
+        return DampedEquilibrium(
+            self.model, self.back, self.contact, free_height=floats, parts=parts, extra_nodes=self.extra_nodes
+        )
 
     def close(self, gap_mm: float) -> Closed:
         """Close the plates from first touch to a gap and let the breast come to rest.
@@ -159,7 +170,7 @@ class Closing:
                 f"the plates' gap of {gap_mm:.1f} mm does not compress a breast of {self.uncompressed_mm:.1f} mm"
             )
         equilibrium = self.equilibrium()
-        points = self.model.points
+        points = self.points
         memory = self.contact.start(points, self.plates(self.uncompressed_mm, 0.0), 0.0)
         state = DampedState(points, np.zeros(len(self.model.hexes)), 0.0, memory)
         done, last, taken, cuts = 0.0, self.uncompressed_mm, 0, 0
@@ -179,45 +190,41 @@ class Closing:
             step = min(1.5 * step, 1.0 / self.options.steps)
         return self._settled(equilibrium, state, gap_mm, taken, cuts, self.options.damping)
 
-    def rest(self, closed: Closed, ties: PlaneTies, damping: float) -> Closed:
+    def rest(self, closed: Closed, outline: Part, damping: float) -> Closed:
         """Go on from a closed state with an outline drawing on the skin.
 
         Raises:
             NotConvergedError: with the reason.
         """
-        equilibrium = self.equilibrium(ties)
+        equilibrium = self.equilibrium(outline)
+        lagged = self.parts if closed.state.parts is None else closed.state.parts[: len(self.parts)]
+        state = replace(closed.state, parts=(*lagged, outline))
         # Easing the contact first would unload the friction that the closing has built up.
         stiffest = self.options.stiffening[-1] if self.options.stiffening else 1.0
         stiff = equilibrium.with_contact(self.contact.stiffened(stiffest))
         try:
-            return self._rested(stiff, closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
+            return self._rested(stiff, state, closed.gap_mm, closed.steps, closed.cuts, damping)
         except NotConvergedError:
-            return self._settled(equilibrium, closed.state, closed.gap_mm, closed.steps, closed.cuts, damping)
-
-    def _anchors(self, share: float) -> Array:
-        anchors = self.model.points.copy()
-        anchors[self.back.nodes] += share * self.back.pull_mm
-        return anchors
+            return self._settled(equilibrium, state, closed.gap_mm, closed.steps, closed.cuts, damping)
 
     def _advance(
         self, equilibrium: DampedEquilibrium, state: DampedState, last: float, gap: float, share: float
     ) -> DampedState:
-        plates, anchors = self.plates(gap, share), self._anchors(share)
-        guess = self.predictor.predict(state.positions, state.height, plates, gap / last)
+        load = Load(self.plates(gap, share), share)
+        guess = self.predictor.predict(state.positions, state.height, load.plates, gap / last)
         if self.model.determinants(guess).min() < LEAST_GUESS_DET:
             guess = state.positions
-        guess = np.where(equilibrium.held, anchors, guess)
-        start = replace(state, positions=guess)
-        return equilibrium.step(start, plates, anchors, self.options.damping, self.options.tolerance_mm)
+        start = replace(state, positions=np.where(equilibrium.held, equilibrium.anchors(share), guess))
+        return equilibrium.step(start, load, self.options.damping, self.options.tolerance_mm)
 
     def _settled(
         self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
     ) -> Closed:
         """Rest in the stiffened contact or, where that is not found, in the soft one."""
-        plates, anchors, stiff, eased = self.plates(gap_mm), self._anchors(1.0), equilibrium, state
+        load, stiff, eased = Load(self.plates(gap_mm)), equilibrium, state
         try:
             for factor in self.options.stiffening:
-                eased = self._eased(stiff, eased, plates, anchors, damping)
+                eased = self._eased(stiff, eased, load, damping)
                 stiff = equilibrium.with_contact(self.contact.stiffened(factor))
             return self._rested(stiff, eased, gap_mm, taken, cuts, STIFF_DAMPING * damping)
         except NotConvergedError:
@@ -225,25 +232,23 @@ class Closing:
                 raise
         return self._rested(equilibrium, state, gap_mm, taken, cuts + 1, damping)
 
-    def _eased(
-        self, contact: DampedEquilibrium, state: DampedState, plates: Sequence[Plate], anchors: Array, damping: float
-    ) -> DampedState:
+    def _eased(self, contact: DampedEquilibrium, state: DampedState, load: Load, damping: float) -> DampedState:
         """One step in a contact, damped harder where it fails."""
         for factor in (damping, HARDER * damping):
             try:
-                return contact.step(state, plates, anchors, factor, self.options.tolerance_mm)
+                return contact.step(state, load, factor, self.options.tolerance_mm)
             except NotConvergedError:
                 continue
-        return contact.step(state, plates, anchors, HARDER**2 * damping, self.options.tolerance_mm)
+        return contact.step(state, load, HARDER**2 * damping, self.options.tolerance_mm)
 
     def _rested(
         self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
     ) -> Closed:
-        plates, anchors = self.plates(gap_mm), self._anchors(1.0)
+        load = Load(self.plates(gap_mm))
         tolerance, moved, factor = self.options.tolerance_mm, np.inf, damping
         for _ in range(self.options.rests):
             try:
-                after = equilibrium.step(state, plates, anchors, factor, tolerance)
+                after = equilibrium.step(state, load, factor, tolerance)
             except NotConvergedError:
                 cuts, factor = cuts + 1, HARDER * factor
                 continue
@@ -253,23 +258,24 @@ class Closing:
                 break
         if not np.isfinite(moved) or moved > RESTLESS_MM:
             raise NotConvergedError(f"the breast does not come to rest between the plates (last moved {moved:.1f} mm)")
-        return self._closed(equilibrium, state, plates, gap_mm, taken, cuts, moved)
+        return self._closed(equilibrium, state, load, gap_mm, taken, cuts, moved)
 
     def _closed(
         self,
         equilibrium: DampedEquilibrium,
         state: DampedState,
-        plates: Sequence[Plate],
+        load: Load,
         gap_mm: float,
         taken: int,
         cuts: int,
         moved: float,
     ) -> Closed:
-        terms = equilibrium.terms(state, plates)
+        terms = equilibrium.terms(state, load.plates)
+        count = len(self.model.points)
         forces = np.abs(terms.plate_force[:, 2]) * 1e-3
         return Closed(
-            deformed=state.positions,
-            height_mm=plates[0].height_mm + state.height,
+            deformed=state.positions[:count],
+            height_mm=load.plates[0].height_mm + state.height,
             gap_mm=gap_mm,
             force_n=(float(forces[0]), float(forces[1])),
             iterations=len(equilibrium.residuals),
@@ -282,4 +288,5 @@ class Closing:
             penetration_mm=terms.penetration_mm,
             energy_mj=self.model.energy_mj(state.positions),
             state=state,
+            extra=None if self.extra_nodes is None else state.positions[count:],
         )

@@ -10,15 +10,16 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, SoftMemory, SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
 from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.parts import Part, Parts, all_nodes, back_springs, parts_at
 from mammoreg.fem.sparse import Array, Integers
 from mammoreg.fem.system import NewtonSystem, node_dofs
-from mammoreg.fem.ties import PlaneTies
 
 LEAST_DET_SHARE = 0.2  # a Newton step may shrink the smallest det F to this share of itself
 RUNAWAY_MM = 200.0
@@ -27,25 +28,45 @@ ITERATIONS = 14
 
 @dataclass(frozen=True)
 class DampedState:
-    """A deformation: nodes (N, 3) mm, element pressures (E,) kPa, the plates' extra height mm, contact memory."""
+    """A deformation.
+
+    Attributes:
+        positions: nodes (N, 3), extra ones behind the body's, mm.
+        pressure: element pressures (E,), kPa.
+        height: the plates' extra height, mm.
+        memory: of the contact.
+        parts: as they were renewed here; None: as the equilibrium has them at first.
+    """
 
     positions: Array
     pressure: Array
     height: float
     memory: SoftMemory
+    parts: Parts | None = None
+
+
+@dataclass(frozen=True)
+class Load:
+    """What a step loads: plates (lower, upper), and the share of the back's pull and of gradual parts."""
+
+    plates: tuple[Plate, Plate]
+    share: float = 1.0
 
 
 class DampedEquilibrium:
-    """A breast held at its back, in soft contact with plates, optionally tied to an outline.
+    """A body held at its back, in soft contact with plates, with further parts.
 
     Args:
         model: the body in the plate frame.
-        back: its back's condition.
+        back: its back's condition; may name extra nodes.
         contact: its contact.
         free_height: whether the plates' common height is an unknown.
-        ties: springs towards an outline.
+        parts: what else acts.
+        extra_nodes: undeformed nodes (M, 3) beside the body's, mm, numbered behind them.
 
     Attributes:
+        points: all undeformed nodes.
+        held: their prescribed components.
         residuals: residual ratio of each Newton iteration so far.
     """
 
@@ -56,17 +77,19 @@ class DampedEquilibrium:
         contact: SoftContact,
         *,
         free_height: bool,
-        ties: PlaneTies | None = None,
+        parts: Sequence[Part] = (),
+        extra_nodes: Array | None = None,
     ) -> None:
-        self.model, self.back, self.contact, self.ties = model, back, contact, ties
-        count = len(model.points)
-        self.total = 3 * count + 1
-        self.held = np.zeros((count, 3), dtype=bool)
+        self.model, self.back, self.contact = model, back, contact
+        self.points = all_nodes(model.points, extra_nodes)
+        self.springs, self.parts = back_springs(back, self.points), tuple(parts)
+        self.total = self.points.size + 1
+        self.held = np.zeros(self.points.shape, dtype=bool)
         self.held[back.nodes] = back.held
-        free: Integers = np.flatnonzero(np.append(~self.held.ravel(), free_height))
-        self.system = NewtonSystem(model, self._groups(), free, self.total)
+        self.free: Integers = np.flatnonzero(np.append(~self.held.ravel(), free_height))
         self.weight = self._weight()
         self.residuals: list[float] = []
+        self._prepare(self.parts)
 
     def with_contact(self, contact: SoftContact) -> "DampedEquilibrium":
         """The same equations and record with another contact of the same faces."""
@@ -74,30 +97,46 @@ class DampedEquilibrium:
         other.contact = contact
         return other
 
-    def _groups(self) -> list[Integers]:
-        """Degrees of freedom of springs, contact, damping and ties."""
+    def anchors(self, share: float) -> Array:
+        """Where held components (N, 3) stand at a share of the pull."""
+        anchors = self.points.copy()
+        anchors[self.back.nodes] += share * self.back.pull_mm
+        return anchors
+
+    def _prepare(self, parts: Parts) -> None:
+        """The linear system for the degrees of freedom of parts."""
         faces = node_dofs(self.contact.surface.quads)
         with_height = np.hstack([faces, np.full((len(faces), 1), self.total - 1)])
         every = np.arange(self.total)[:, None]
-        groups = [node_dofs(self.back.nodes[:, None]), with_height, every]
-        return groups if self.ties is None else [*groups, node_dofs(self.ties.nodes)]
+        groups = [*(s.dofs for s in self.springs), with_height, every, *(part.dofs for part in parts)]
+        self.system = NewtonSystem(self.model, groups, self.free, self.total)
+        self._prepared = parts
+
+    def _fit(self, parts: Parts) -> None:
+        """Prepare the system anew where parts have other degrees of freedom than it was made for."""
+        same = len(parts) == len(self._prepared) and all(
+            new is old or np.array_equal(new.dofs, old.dofs) for new, old in zip(parts, self._prepared, strict=True)
+        )
+        if same:
+            self._prepared = parts
+        else:
+            self._prepare(parts)
 
     def _weight(self) -> Array:
         """Damping (total,) per unit of the damping factor, mN/mm: mu times the node's share of volume over h^2."""
         volume = np.bincount(self.model.hexes.ravel(), weights=np.repeat(self.model.volume / 8.0, 8))
         mu = float(np.average(self.model.material.mu_kpa, weights=self.model.volume))
         size = float(np.mean(self.model.volume)) ** (1.0 / 3.0)
-        return np.asarray(np.append(np.repeat(volume, 3), volume.sum()) * mu / size**2)
+        body, extra = self.points[: len(volume)], self.points[len(volume) :]
+        share = np.append(volume, volume[cKDTree(body).query(extra)[1]])
+        return np.asarray(np.append(np.repeat(share, 3), volume.sum()) * mu / size**2)
 
-    def step(
-        self, start: DampedState, plates: Sequence[Plate], anchors: Array, damping: float, tolerance_mm: float
-    ) -> DampedState:
+    def step(self, start: DampedState, load: Load, damping: float, tolerance_mm: float) -> DampedState:
         """One implicit step, damped towards its start.
 
         Args:
             start: deformation to start from; held components must stand at their targets.
-            plates: lower and upper.
-            anchors: places (N, 3) of the back's springs.
+            load: plates, and how far the other loads are on.
             damping: factor of the damping.
             tolerance_mm: the iteration ends at updates below this.
 
@@ -105,13 +144,16 @@ class DampedEquilibrium:
             NotConvergedError: elements turn inside out, or the updates do not become small.
         """
         state = start
+        lagged = self.parts if start.parts is None else start.parts
+        self._fit(lagged)
+        acting = parts_at((*self.springs, *lagged), load.share)
         for _ in range(ITERATIONS):
-            update, pressure = self._newton(state, start, plates, anchors, damping)
+            update, pressure = self._newton(state, start, load.plates, acting, damping)
             state, moved = self._moved(state, update, pressure)
             if moved < tolerance_mm:
-                terms = self.terms(state, plates)
-                memory = self.contact.remember(state.positions, plates, state.height, terms)
-                return replace(state, memory=memory)
+                terms = self.terms(state, load.plates)
+                memory = self.contact.remember(state.positions, load.plates, state.height, terms)
+                return replace(state, memory=memory, parts=tuple(part.renewed(state.positions) for part in lagged))
         raise NotConvergedError(f"no equilibrium within {ITERATIONS} Newton iterations")
 
     def terms(self, state: DampedState, plates: Sequence[Plate]) -> SoftTerms:
@@ -119,28 +161,18 @@ class DampedEquilibrium:
         return self.contact.terms(state.positions, state.height, plates, state.memory)
 
     def _newton(
-        self, state: DampedState, start: DampedState, plates: Sequence[Plate], anchors: Array, damping: float
+        self, state: DampedState, start: DampedState, plates: Sequence[Plate], acting: Parts, damping: float
     ) -> tuple[Array, Array]:
         elements = self.model.state(state.positions)
         internal = self.model.residual(elements, state.pressure)
         contact = self.terms(state, plates)
-        stretch = state.positions[self.back.nodes] - anchors[self.back.nodes]
         moved = np.append((state.positions - start.positions).ravel(), state.height - start.height)
-        vectors = [
-            internal.force,
-            np.einsum("bij,bj->bi", self.back.springs, stretch),
-            contact.force,
-            (damping * self.weight * moved)[:, None],
-        ]
-        blocks = [
-            self.model.stiffness(elements, state.pressure, internal.coupling),
-            self.back.springs,
-            contact.stiffness,
-            (damping * self.weight)[:, None, None],
-        ]
-        if self.ties is not None:
-            vectors.append(self.ties.force(state.positions))
-            blocks.append(self.ties.blocks())
+        pairs = [part.terms(state.positions) for part in acting]
+        springs, others = pairs[: len(self.springs)], pairs[len(self.springs) :]
+        tangent = self.model.stiffness(elements, state.pressure, internal.coupling)
+        damped = (damping * self.weight * moved)[:, None], (damping * self.weight)[:, None, None]
+        groups = [(internal.force, tangent), *springs, (contact.force, contact.stiffness), damped, *others]
+        vectors, blocks = [vector for vector, _ in groups], [block for _, block in groups]
         self.residuals.append(self.system.unbalance(vectors))
         return self.system.increment(internal, vectors, blocks)
 

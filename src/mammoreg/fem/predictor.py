@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mammoreg.contact.plate import Array, Plate
 from mammoreg.fem.boundary import BackCondition, Integers
@@ -18,9 +19,11 @@ class AffinePredictor:
 
     Attributes:
         reach: share (N,) of the spread that a node takes part in: 0 on a held back, 1 far from it.
+        body: how many of the nodes are the body's, about whose middle and root the spread is.
     """
 
     reach: Array
+    body: int
 
     def predict(self, positions: Array, height: float, plates: Sequence[Plate], ratio: float) -> Array:
         """Nodes (N, 3) for plates (lower, upper) whose gap has shrunk by `ratio`, both shifted by `height`."""
@@ -33,8 +36,8 @@ class AffinePredictor:
             imaged = np.clip(1.0 - (positions[:, 1] - flat_end) / FADE_MM, 0.0, 1.0)
         squeeze = 1.0 + imaged * (ratio - 1.0)
         spread = 1.0 + self.reach * imaged * (ratio**-0.5 - 1.0)
-        centre = positions.mean(axis=0)
-        root = positions[:, 1].max()
+        centre = positions[: self.body].mean(axis=0)
+        root = positions[: self.body, 1].max()
         moved = positions.copy()
         moved[:, 2] = 0.5 * (low + high) + squeeze * (positions[:, 2] - 0.5 * (low + high))
         moved[:, 2] = np.where(imaged >= 1.0, np.clip(moved[:, 2], low, high), moved[:, 2])
@@ -43,10 +46,13 @@ class AffinePredictor:
         return moved
 
 
-def affine_predictor(points: Array, back: BackCondition) -> AffinePredictor:
-    """Predictor of a body: the spread grows from zero at nodes held across the plates' direction."""
+def affine_predictor(points: Array, back: BackCondition, body: int) -> AffinePredictor:
+    """Predictor of nodes (N, 3), the first `body` of them the body's.
+
+    The spread grows from zero at nodes held across the plates' direction.
+    """
     pinned: Integers = back.nodes[back.held[:, :2].all(axis=1)]
     if len(pinned) == 0:
-        return AffinePredictor(np.ones(len(points)))
-    nearest = np.linalg.norm(points[:, None] - points[pinned][None], axis=-1).min(axis=1)
-    return AffinePredictor(np.clip(nearest / FADE_MM, 0.0, 1.0))
+        return AffinePredictor(np.ones(len(points)), body)
+    nearest = cKDTree(points[pinned]).query(points)[0]
+    return AffinePredictor(np.clip(nearest / FADE_MM, 0.0, 1.0), body)

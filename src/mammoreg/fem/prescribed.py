@@ -1,5 +1,6 @@
 """Interior of a body whose skin is prescribed: the `updated` boundary conditions (paper, II-C)."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +10,7 @@ from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import Array, BackCondition
 from mammoreg.fem.equilibrium import Equilibrium, NewtonOptions, State
 from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.parts import Part, all_nodes
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ class PrescribedResult:
         min_det_f: smallest det F at a Gauss point.
         volume_change: relative change of the whole volume.
         reaction_n: force (3,) that holds the prescribed nodes.
+        extra: extra nodes (M, 3), mm, or None.
     """
 
     deformed: Array
@@ -52,6 +55,7 @@ class PrescribedResult:
     min_det_f: float
     volume_change: float
     reaction_n: Array
+    extra: Array | None = None
 
 
 def solve_prescribed(
@@ -62,6 +66,8 @@ def solve_prescribed(
     start: Array | None = None,
     pressure: Array | None = None,
     options: PrescribedOptions | None = None,
+    parts: Sequence[Part] = (),
+    extra_nodes: Array | None = None,
 ) -> PrescribedResult:
     """Move nodes (B,) to targets (B, 3), mm, in steps; the rest finds its equilibrium.
 
@@ -70,24 +76,30 @@ def solve_prescribed(
         nodes: prescribed in all components.
         targets: where they end.
         back: condition of back nodes that are not prescribed.
-        start: nodes (N, 3) from which to go, det F > 0; default the undeformed body.
+        start: nodes (N, 3) or with the extra ones (N + M, 3) from which to go, det F > 0; default the undeformed ones.
         pressure: element pressures (E,) at the start, kPa; default zero.
         options: steps.
+        parts: what acts beside elements and back; gradual ones come on with the steps.
+        extra_nodes: undeformed nodes (M, 3) beside the body's, mm, numbered behind them; `nodes`, `back` and `parts`
+            may name them.
 
     Raises:
         NotConvergedError: with the reason and how far the nodes came.
     """
     options = options if options is not None else PrescribedOptions()
-    held, goal = _held(model, nodes, targets, back)
-    origin = model.points if start is None else np.asarray(start, dtype=float)
+    points = all_nodes(model.points, extra_nodes)
+    held, goal = _held(points, nodes, targets, back)
+    origin = points.copy()
+    if start is not None:
+        origin[: len(start)] = start
     state = State(origin, np.zeros(len(model.hexes)) if pressure is None else pressure)
-    equilibrium = Equilibrium(model, held, back)
+    equilibrium = Equilibrium(model, held, back, parts, extra_nodes)
     done, step, steps, cuts = 0.0, options.first_step, 0, 0
     while done < 1.0:
         share = min(1.0, done + step)
         before = len(equilibrium.residuals)
         try:
-            state = equilibrium.solve(state, origin + share * (goal - origin), options.newton)
+            state = equilibrium.solve(state, origin + share * (goal - origin), options.newton, share)
         except NotConvergedError as error:
             cuts, step = cuts + 1, 0.5 * step
             if step < options.least_step:
@@ -97,7 +109,7 @@ def solve_prescribed(
         if len(equilibrium.residuals) - before <= options.easy_iterations:
             step *= 2.0
     return PrescribedResult(
-        deformed=state.positions,
+        deformed=state.positions[: len(model.points)],
         pressure=state.pressure,
         iterations=len(equilibrium.residuals),
         steps=steps,
@@ -107,15 +119,16 @@ def solve_prescribed(
         min_det_f=float(model.determinants(state.positions).min()),
         volume_change=model.volume_change(state.positions),
         reaction_n=1e-3 * equilibrium.reaction(state)[nodes].sum(axis=0),
+        extra=None if extra_nodes is None else state.positions[len(model.points) :],
     )
 
 
 def _held(
-    model: HyperelasticModel, nodes: NDArray[np.integer], targets: Array, back: BackCondition | None
+    points: Array, nodes: NDArray[np.integer], targets: Array, back: BackCondition | None
 ) -> tuple[NDArray[np.bool_], Array]:
     """Held components (N, 3) and where they end (N, 3)."""
-    held = np.zeros(model.points.shape, dtype=bool)
-    goal = model.points.copy()
+    held = np.zeros(points.shape, dtype=bool)
+    goal = points.copy()
     if back is not None:
         held[back.nodes] = back.held
         goal[back.nodes] += back.pull_mm

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mammoreg.fem.sparse import Array, Integers
+from mammoreg.fem.system import node_dofs
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,23 @@ class PlaneTies:
     def distance(self, positions: Array) -> Array:
         """Distance (T,) of the points from their planes at deformed nodes (N, 3), mm."""
         return np.asarray(np.einsum("ti,ti->t", self.points(positions), self.direction) - self.offset)
+
+    @property
+    def dofs(self) -> Integers:
+        """Degrees of freedom (T, 12) of the faces' corners."""
+        return node_dofs(self.nodes)
+
+    def terms(self, positions: Array) -> tuple[Array, Array]:
+        """Residual (T, 12), mN, and stiffness (T, 12, 12), mN/mm."""
+        return self.force(positions), self.blocks()
+
+    def energy_mj(self, positions: Array) -> float:
+        """Energy in the springs."""
+        return 0.5e-3 * float(np.sum(self.stiffness * self.distance(positions) ** 2))
+
+    def renewed(self, _positions: Array) -> "PlaneTies":
+        """Itself."""
+        return self
 
     def force(self, positions: Array) -> Array:
         """Residual (T, 12) in mN."""
