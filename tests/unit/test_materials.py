@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mammoreg.materials.catalogue import CATALOGUE, Tissue
+from mammoreg.materials.catalogue import CATALOGUE, SKIN, Tissue
 from mammoreg.materials.cube import SULLIVAN, cube_force_n, mu_for_force_kpa
 from mammoreg.materials.elastic import bulk_ratio, neo_hookean
-from mammoreg.materials.laws import Exponential, Linear, NeoHookean
+from mammoreg.materials.laws import Exponential, HardenedFat, Linear, NeoHookean
 from stages import calibrate
 from stages.contract import Inputs, Subject
 from tests.shared_data import DATA, requires_shared
@@ -26,12 +26,21 @@ def test_constants_and_provenance_are_those_of_the_reference(model: str) -> None
     for name in ("fat", "gland"):
         tissue: Tissue = getattr(CATALOGUE[model], name)
         entry = reference.get(name, reference.get("all"))
-        assert LAW_NAMES[type(tissue.law)] == entry["law"]
+        hardened = isinstance(tissue.law, HardenedFat)
+        law = tissue.law.fat if isinstance(tissue.law, HardenedFat) else tissue.law
+        assert LAW_NAMES[type(law)] == entry["law"]
         for constant, given_as in entry["constants"].items():
             scale = 1e-3 if constant.endswith("_pa") else 1.0
             own = constant.replace("_pa", "_kpa")
-            assert getattr(tissue.law, own) == pytest.approx(given_as["value"] * scale)
-            assert tissue.sources[own].provenance == given_as["provenance"]
+            assert getattr(law, own) == pytest.approx(given_as["value"] * scale)
+            assert tissue.sources[f"fat.{own}" if hardened else own].provenance == given_as["provenance"]
+
+
+def test_hardening_is_said_to_be_an_assumption_and_skin_is_the_papers() -> None:
+    sources = CATALOGUE["azar"].fat.sources
+    assert {sources[name].provenance for name in ("onset", "b_kpa", "m")} == {"assumption"}
+    assert SKIN.law == Linear(10.0)
+    assert SKIN.independent
 
 
 @requires_shared("reference")
@@ -85,8 +94,8 @@ def test_impossible_poisson_ratios_are_refused(poisson: float) -> None:
 
 def test_material_spreads_over_elements_and_refuses_nonsense() -> None:
     material = neo_hookean(np.array([1.0, 2.0]), 0.49, fibre=np.array([0.0, 3.0, 4.0]), fibre_kpa=5.0).of_elements(2)
-    assert material.fibre is not None
-    np.testing.assert_allclose(material.fibre, np.tile([0.0, 0.6, 0.8], (2, 1)))
+    assert material.fibres is not None
+    np.testing.assert_allclose(material.fibres.direction, np.tile([0.0, 0.6, 0.8], (2, 1)))
     with pytest.raises(ValueError, match="positive"):
         neo_hookean(np.array([1.0, 0.0])).of_elements(2)
     with pytest.raises(ValueError, match="negative"):

@@ -4,9 +4,9 @@ Perturbed Lagrangian with the isochoric split and a pressure constant per elemen
 iteration (design note on the solver, recipe 1):
 
     Pi(u, p) = integral of  W(F / J^(1/3)) + p (J - 1) - p^2 / (2 K)
-    W = mu/2 (I1bar - 3) + k1/2 max(I4bar - 1, 0)^2
+    W = W1(I1bar) + W4(I4bar)
 
-The second term is the transversely isotropic reinforcement, active in tension along the fibre only.
+W1 is the isochoric law, neo-Hookean or any other; W4 the reinforcement, active in tension along the fibre only.
 """
 
 from dataclasses import dataclass
@@ -33,16 +33,15 @@ class ElementState:
         det: det F (E, Q).
         fictitious: Kirchhoff stress before its deviator is taken, isotropic part, trace (E, Q), kPa.
         deviator: deviatoric Kirchhoff stress, Voigt (E, Q, 6), kPa.
-        fibre: deviator of the fibre's structure tensor, Voigt (E, Q, 6), or None; with its stiffness (E, Q), kPa.
-        fibre_stiffness: 4 d2W/dI4^2 (E, Q), kPa, or None.
+        bends: further terms of the isochoric tangent, c d x d: c (E, Q) in kPa and deviators d, Voigt (E, Q, 6). The
+            law's own, 4 W1'' and dev(bbar), where it has a curvature; the fibre's, 4 W4'' and its structure tensor's.
     """
 
     gradients: Array
     det: Array
     fictitious: Array
     deviator: Array
-    fibre: Array | None
-    fibre_stiffness: Array | None
+    bends: tuple[tuple[Array, Array], ...]
 
 
 @dataclass(frozen=True)
@@ -94,18 +93,24 @@ class HyperelasticModel:
         inverse = cofactors.swapaxes(-1, -2) / det[..., None, None]
         scale = det ** (-2.0 / 3.0)
         left = gradient @ gradient.transpose(0, 1, 3, 2)
-        stress = (self.material.mu_kpa[:, None] * scale)[..., None] * _voigt(left)
-        fibre, stiffness = None, None
-        if self.material.fibre is not None and self.material.fibre_kpa is not None:
-            structure = _voigt_dyad(gradient @ self.material.fibre[:, None, :, None]) * scale[..., None]
+        stress, bends = self._law_stress(_voigt(left), scale)
+        fibres = self.material.fibres
+        if fibres is not None:
+            structure = _voigt_dyad(gradient @ fibres.direction[:, None, :, None]) * scale[..., None]
             stretch = structure[..., :3].sum(axis=-1)
-            tension = stretch > 1.0
-            constant = self.material.fibre_kpa[:, None]
-            stress = stress + (2.0 * constant * np.where(tension, stretch - 1.0, 0.0))[..., None] * structure
-            fibre, stiffness = _deviator(structure), 4.0 * constant * tension
-        return ElementState(
-            self.gradients @ inverse, det, stress[..., :3].sum(axis=-1), _deviator(stress), fibre, stiffness
-        )
+            stress = stress + (2.0 * fibres.slope_kpa(stretch))[..., None] * structure
+            bends = (*bends, (4.0 * fibres.curvature_kpa(stretch), _deviator(structure)))
+        return ElementState(self.gradients @ inverse, det, stress[..., :3].sum(axis=-1), _deviator(stress), bends)
+
+    def _law_stress(self, left: Array, scale: Array) -> tuple[Array, tuple[tuple[Array, Array], ...]]:
+        """Stress 2 W1' bbar, Voigt (E, Q, 6), and the law's term of curvature, if it has one."""
+        law = self.material.law
+        if law is None:
+            return (self.material.mu_kpa[:, None] * scale)[..., None] * left, ()
+        isochoric = scale[..., None] * left
+        i1 = isochoric[..., :3].sum(axis=-1)
+        bend = (4.0 * law.curvature_kpa(i1), _deviator(isochoric))
+        return (2.0 * law.slope_kpa(i1))[..., None] * isochoric, (bend,)
 
     def residual(self, state: ElementState, pressure: Array) -> Residual:
         """Internal forces at element pressures (E,) in kPa (positive in tension)."""
@@ -138,21 +143,25 @@ class HyperelasticModel:
         moduli = (2.0 / 3.0 * state.fictitious)[..., None, None] * _DEVIATOR
         moduli -= 2.0 / 3.0 * (cross + cross.swapaxes(-1, -2))
         moduli += (pressure[:, None] * state.det)[..., None, None] * _VOLUMETRIC
-        if state.fibre is not None and state.fibre_stiffness is not None:
-            scaled = state.fibre_stiffness[..., None] * state.fibre
-            moduli += scaled[..., :, None] * state.fibre[..., None, :]
+        for stiffness, deviator in state.bends:
+            moduli += (stiffness[..., None] * deviator)[..., :, None] * deviator[..., None, :]
         return np.asarray(moduli * self.weights[..., None, None])
 
     def energy_mj(self, positions: Array) -> float:
         """Isochoric strain energy in mJ (N mm)."""
         gradient = self.deformation_gradients(positions)
         scale = np.linalg.det(gradient) ** (-2.0 / 3.0)
-        density = 0.5 * self.material.mu_kpa[:, None] * ((gradient**2).sum(axis=(-1, -2)) * scale - 3.0)
-        if self.material.fibre is not None and self.material.fibre_kpa is not None:
-            along = (gradient @ self.material.fibre[:, None, :, None])[..., 0]
-            stretch = (along**2).sum(axis=-1) * scale
-            density += 0.5 * self.material.fibre_kpa[:, None] * np.maximum(stretch - 1.0, 0.0) ** 2
+        size = (gradient**2).sum(axis=(-1, -2)) * scale
+        law, fibres = self.material.law, self.material.fibres
+        density = 0.5 * self.material.mu_kpa[:, None] * (size - 3.0) if law is None else law.energy_kpa(size)
+        if fibres is not None:
+            along = (gradient @ fibres.direction[:, None, :, None])[..., 0]
+            density += fibres.energy_kpa((along**2).sum(axis=-1) * scale)
         return float((self.weights * density).sum()) * 1e-3
+
+    def volumetric_energy_mj(self, pressure: Array) -> float:
+        """Energy in mJ that element pressures (E,) in kPa store in the change of volume: V p^2 / (2 K)."""
+        return float((pressure**2 / (2.0 * self.bulk_per_volume)).sum()) * 1e-3
 
     def volume_change(self, positions: Array) -> float:
         """Relative change of the body's volume at deformed nodes (N, 3)."""

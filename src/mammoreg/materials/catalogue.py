@@ -2,14 +2,14 @@
 
 Provenance: `published`, read in a public source that cites the publication, or in the paper; `table_1_implied`, solved
 from the paper's Table I; `assumption`, chosen by this project; `memory`, not verified against the publication. Azar's
-hardening of fat sets in above the strains of Table I and is left out: his column is Wellman's.
+hardening of fat is not seen in the strains of Table I, where his column is Wellman's: it sets in above them.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from mammoreg.materials.laws import Exponential, Law, Linear, NeoHookean
+from mammoreg.materials.laws import Exponential, HardenedFat, Law, Linear, NeoHookean
 
 Provenance = Literal["published", "table_1_implied", "assumption", "memory"]
 
@@ -50,21 +50,32 @@ class TissueModel:
 
 
 _WELLMAN_MODULUS = "cited from Wellman 1999 in github.com/eloygarcia/RadboudCompression and thesis-Registration"
+_FAT_LAW, _GLAND_LAW = Exponential(4.46, 7.4), Exponential(15.1, 12.3)
 _WELLMAN_FAT = Tissue(
-    Exponential(4.46, 7.4),
+    _FAT_LAW,
     {
         "b_kpa": Source("published", f"4.46 kPa {_WELLMAN_MODULUS}"),
         "m": Source("memory", "reproduces Table I exactly"),
     },
 )
 _WELLMAN_GLAND = Tissue(
-    Exponential(15.1, 12.3),
+    _GLAND_LAW,
     {
         "b_kpa": Source("published", f"15.1 kPa {_WELLMAN_MODULUS}"),
         "m": Source("table_1_implied", "12.2989 to 12.3000 with b = 15.1 kPa; Azar's tables are said to give 10.0"),
     },
 )
-_WELLMAN = TissueModel(_WELLMAN_FAT, _WELLMAN_GLAND, {"fat": 9.0, "gland": 2217.0})
+_AZAR_FAT = Tissue(
+    HardenedFat(_FAT_LAW, _GLAND_LAW, onset=0.21, b_kpa=4.46, m=12.3),
+    {
+        "fat.b_kpa": _WELLMAN_FAT.sources["b_kpa"],
+        "fat.m": _WELLMAN_FAT.sources["m"],
+        "onset": Source("assumption", "where Table I, whose column is Wellman's, ends to speak; Azar's was not found"),
+        "b_kpa": Source("assumption", "fat's own initial modulus; Azar's was not found"),
+        "m": Source("assumption", "gland's exponent, which keeps fat softer than gland; Azar's was not found"),
+    },
+)
+_FORCES_WELLMAN = {"fat": 9.0, "gland": 2217.0}
 
 
 def _from_table_1(law: Law, name: str, note: str) -> Tissue:
@@ -81,8 +92,8 @@ _HOMOGENEOUS = Tissue(
 )
 
 CATALOGUE: Mapping[str, TissueModel] = {
-    "wellman": _WELLMAN,
-    "azar": _WELLMAN,
+    "wellman": TissueModel(_WELLMAN_FAT, _WELLMAN_GLAND, _FORCES_WELLMAN),
+    "azar": TissueModel(_AZAR_FAT, _WELLMAN_GLAND, _FORCES_WELLMAN),
     "samani": TissueModel(
         _from_table_1(NeoHookean(18.49), "mu_kpa", "+- 0.16 kPa from the rounding"),
         _from_table_1(NeoHookean(37.95), "mu_kpa", "+- 0.04 kPa from the rounding"),
@@ -107,3 +118,7 @@ CATALOGUE: Mapping[str, TissueModel] = {
     "lorenzen": TissueModel(_lorenzen(1.7, "0.62 to 1.85"), _lorenzen(2.5, "2.33 to 2.85"), {"fat": 1.0, "gland": 5.0}),
     "homogeneous": TissueModel(_HOMOGENEOUS, _HOMOGENEOUS),
 }
+
+SKIN = Tissue(
+    Linear(10.0), {"e_kpa": Source("published", "the paper, section II-D, after Samani: constant below 50 % strain")}
+)

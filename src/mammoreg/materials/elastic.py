@@ -1,11 +1,14 @@
-"""Constants of the nearly incompressible material of a finite-element body."""
+"""Material of a finite-element body: isochoric law, bulk modulus and fibres of each element."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mammoreg.materials.fibres import Fibres
+from mammoreg.materials.isochoric import Array, IsochoricLaw
+from mammoreg.materials.mixture import TissueMixture
+from mammoreg.materials.neo_hookean import NeoHookean
+from mammoreg.materials.uniaxial import UniaxialLaw
 
 
 def bulk_ratio(poisson: float) -> float:
@@ -21,33 +24,39 @@ def bulk_ratio(poisson: float) -> float:
 
 @dataclass(frozen=True)
 class ElasticMaterial:
-    """Neo-Hookean with bulk modulus, optionally reinforced along a fibre in tension.
+    """Constants of a nearly incompressible body.
 
     Attributes:
-        mu_kpa: shear modulus, scalar or (E,).
+        mu_kpa: initial shear modulus, scalar or (E,).
         bulk_kpa: bulk modulus K of K/2 (J - 1)^2, scalar or (E,).
-        fibre: undeformed fibre directions, (3,) or (E, 3), in the frame of the mesh; any length but zero.
-        fibre_kpa: stiffness k1 of k1/2 max(I4bar - 1, 0)^2, scalar or (E,).
+        fibres: reinforcement in tension, if any.
+        law: isochoric law of all elements, or their mixture; None: neo-Hookean with `mu_kpa`, whose tangent has no
+            term of curvature to compute.
     """
 
     mu_kpa: Array
     bulk_kpa: Array
-    fibre: Array | None = None
-    fibre_kpa: Array | None = None
+    fibres: Fibres | None = None
+    law: IsochoricLaw | TissueMixture | None = None
 
     def of_elements(self, count: int) -> "ElasticMaterial":
-        """The same constants with one value per element, fibres of unit length; raises ValueError if not positive."""
+        """The same constants with one value per element.
+
+        Raises:
+            ValueError: moduli that are not positive, or a mixture of another number of elements.
+        """
         mu = np.broadcast_to(np.asarray(self.mu_kpa, dtype=float), (count,)).copy()
         bulk = np.broadcast_to(np.asarray(self.bulk_kpa, dtype=float), (count,)).copy()
         if not (np.all(mu > 0.0) and np.all(bulk > 0.0)):
             raise ValueError("shear and bulk moduli must be positive")
-        if self.fibre is None or self.fibre_kpa is None:
-            return ElasticMaterial(mu, bulk)
-        fibre = np.broadcast_to(np.asarray(self.fibre, dtype=float), (count, 3))
-        stiffness = np.broadcast_to(np.asarray(self.fibre_kpa, dtype=float), (count,)).copy()
-        if np.any(stiffness < 0.0):
-            raise ValueError("the fibres' stiffness must not be negative")
-        return ElasticMaterial(mu, bulk, fibre / np.linalg.norm(fibre, axis=1, keepdims=True), stiffness)
+        fibres = None if self.fibres is None else self.fibres.of_elements(count)
+        return ElasticMaterial(mu, bulk, fibres, self.law)
+
+    def part(self, elements: slice) -> "ElasticMaterial":
+        """The material of some elements; needs one value per element."""
+        law = self.law.part(elements) if isinstance(self.law, TissueMixture) else self.law
+        fibres = None if self.fibres is None else self.fibres.part(elements)
+        return ElasticMaterial(self.mu_kpa[elements], self.bulk_kpa[elements], fibres, law)
 
 
 def neo_hookean(
@@ -55,8 +64,44 @@ def neo_hookean(
     poisson: float = 0.495,
     fibre: Array | None = None,
     fibre_kpa: float | Array | None = None,
+    stiffening: float = 0.0,
 ) -> ElasticMaterial:
-    """Neo-Hookean material whose bulk modulus follows from Poisson's ratio; arguments as in `ElasticMaterial`."""
+    """Neo-Hookean material whose bulk modulus follows from Poisson's ratio.
+
+    Args:
+        mu_kpa: shear modulus, scalar or (E,).
+        poisson: Poisson's ratio.
+        fibre, fibre_kpa, stiffening: direction, stiffness and stiffening as in `Fibres`; none without a stiffness.
+    """
     mu = np.asarray(mu_kpa, dtype=float)
-    stiffness = None if fibre_kpa is None else np.asarray(fibre_kpa, dtype=float)
-    return ElasticMaterial(mu, mu * bulk_ratio(poisson), fibre, stiffness)
+    fibres = None if fibre is None or fibre_kpa is None else Fibres(fibre, fibre_kpa, stiffening)
+    return ElasticMaterial(mu, mu * bulk_ratio(poisson), fibres)
+
+
+def hyperelastic(
+    law: IsochoricLaw | TissueMixture,
+    poisson: float = 0.495,
+    bulk_kpa: float | Array | None = None,
+    fibres: Fibres | None = None,
+) -> ElasticMaterial:
+    """Material of any isochoric law, or of a mixture of tissues.
+
+    Args:
+        law: of all elements, or a mixture with one row per element.
+        poisson: gives the bulk modulus over the initial shear modulus where `bulk_kpa` does not.
+        bulk_kpa: bulk modulus, scalar or (E,). Laws that stiffen by orders of magnitude need it: see
+            `tangent_bulk_kpa`.
+        fibres: reinforcement in tension.
+    """
+    mu = np.asarray(law.mu_kpa, dtype=float)
+    bulk = mu * bulk_ratio(poisson) if bulk_kpa is None else np.asarray(bulk_kpa, dtype=float)
+    plain = all(isinstance(one, NeoHookean) for one in (law.laws if isinstance(law, TissueMixture) else (law,)))
+    return ElasticMaterial(mu, bulk, fibres, None if plain else law)
+
+
+def tangent_bulk_kpa(law: UniaxialLaw | NeoHookean, compression: float, poisson: float = 0.495) -> float:
+    """Bulk modulus tied to the stiffness that a law has reached at a compression.
+
+    Its ratio to a third of the tangent ds/de there, the shear modulus of that stiffness, is the one of Poisson's ratio.
+    """
+    return float(law.tangent_kpa(compression)) / 3.0 * bulk_ratio(poisson)

@@ -1,0 +1,63 @@
+"""Elements of mixed tissue: energies weighted by the tissues' shares of the volume."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mammoreg.materials.isochoric import Array, IsochoricLaw
+
+
+@dataclass(frozen=True)
+class TissueMixture:
+    """W = sum of share_t W_t(I1bar), one mixture per element (equal strain in all tissues).
+
+    Attributes:
+        laws: of T tissues.
+        shares: (E, T), not negative, each row's sum 1.
+
+    Raises:
+        ValueError: other shapes, or shares that are not such.
+    """
+
+    laws: tuple[IsochoricLaw, ...]
+    shares: Array
+
+    def __post_init__(self) -> None:
+        if self.shares.ndim != 2 or self.shares.shape[1] != len(self.laws):
+            raise ValueError(f"{len(self.laws)} tissues need shares (E, {len(self.laws)}), not {self.shares.shape}")
+        wrong = np.flatnonzero((self.shares < 0.0).any(axis=1) | ~np.isclose(self.shares.sum(axis=1), 1.0))
+        if wrong.size:
+            raise ValueError(f"element {wrong[0]}: shares of tissue must not be negative and add up to 1")
+
+    @property
+    def mu_kpa(self) -> Array:
+        """Initial shear modulus (E,)."""
+        return np.asarray(self.shares @ np.array([law.mu_kpa for law in self.laws]))
+
+    def part(self, elements: slice) -> "TissueMixture":
+        """The mixture of some elements."""
+        return TissueMixture(self.laws, self.shares[elements])
+
+    def energy_kpa(self, i1: Array) -> Array:
+        """W at I1bar (E, Q)."""
+        return self._sum([law.energy_kpa for law in self.laws], i1)
+
+    def slope_kpa(self, i1: Array) -> Array:
+        """W' at I1bar (E, Q)."""
+        return self._sum([law.slope_kpa for law in self.laws], i1)
+
+    def curvature_kpa(self, i1: Array) -> Array:
+        """W'' at I1bar (E, Q)."""
+        return self._sum([law.curvature_kpa for law in self.laws], i1)
+
+    def _sum(self, functions: list[Callable[[Array], Array]], i1: Array) -> Array:
+        """A tissue costs nothing where it has no share."""
+        total = np.zeros(i1.shape)
+        for share, function in zip(self.shares.T, functions, strict=True):
+            there = np.flatnonzero(share)
+            if there.size == len(share):
+                total += share[:, None] * function(i1)
+            elif there.size:
+                total[there] += share[there, None] * function(i1[there])
+        return total
