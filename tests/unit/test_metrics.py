@@ -1,6 +1,7 @@
 """Measures against closed forms, and the paper's tables against the reference data."""
 
 import json
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -12,8 +13,19 @@ from mammoreg.localization.lesions import LesionArea, MaskLesion, SphereLesion, 
 from mammoreg.metrics.distances import detector_distance_mm, distance_to_curve_mm
 from mammoreg.metrics.elongation import extents_mm
 from mammoreg.metrics.overlap import overlap_of_areas, overlap_of_sizes, overlap_of_volumes
-from mammoreg.metrics.paper import METHODS, TABLE_5, TABLE_6, VOLUNTEER, PaperRow, paper_overlap_percent, paper_summary
-from mammoreg.metrics.summary import summarise
+from mammoreg.metrics.paper import (
+    BEFORE,
+    METHODS,
+    TABLE_2,
+    TABLE_3,
+    TABLE_4,
+    TABLE_5,
+    TABLE_6,
+    PaperRow,
+    paper_overlap_percent,
+    paper_summary,
+)
+from mammoreg.metrics.summary import Summary, summarise
 from tests.shared_data import DATA, requires_shared
 
 GEOMETRY = ViewGeometry(0.0, 0.0, 0.0, -30.0, 60.0, 650.0, 15.0, 0.1, 900, 600)
@@ -144,11 +156,25 @@ def test_paper_tables_equal_the_reference(table: str, rows: tuple[PaperRow, ...]
 
 
 @requires_shared("reference")
-def test_volunteer_equals_the_reference() -> None:
-    reference = json.loads(REFERENCE.read_text())["table_3"]
-    for column, method in ((0, "plate"), (2, "updated")):
-        printed = tuple(reference[name][column] for name in ("mean", "sd", "max"))
-        assert printed == (VOLUNTEER[method].mean_mm, VOLUNTEER[method].sd_mm, VOLUNTEER[method].max_mm)
+@pytest.mark.parametrize(("name", "table"), [("table_2", TABLE_2), ("table_3", TABLE_3)])
+def test_volunteer_equals_the_reference(name: str, table: Mapping[str, Summary]) -> None:
+    printed = json.loads(REFERENCE.read_text())[name]
+    for key in ("mean", "sd", "max"):
+        assert printed[key] == [getattr(summary, f"{key}_mm") for summary in table.values()]
+    firsts = [column.split()[0].lower() for column in printed["columns"]]
+    assert firsts == [method.split("_")[0] for method in table]
+    if name == "table_2":
+        assert printed["before_simulation"] == {"mean": BEFORE.mean_mm, "max": BEFORE.max_mm}
+        assert {summary.n for summary in table.values()} == {printed["landmarks"]}
+
+
+@requires_shared("reference")
+def test_skins_equal_the_reference() -> None:
+    printed = json.loads(REFERENCE.read_text())["table_4"]
+    assert [column.lower() for column in printed["columns"]] == [name.replace("none", "no skin") for name in TABLE_4]
+    for number, kind in enumerate(("euclidean", "lateral")):
+        assert printed[f"{kind}_mean"] == [both[number].mean_mm for both in TABLE_4.values()]
+        assert printed[f"{kind}_max"] == [both[number].max_mm for both in TABLE_4.values()]
 
 
 def test_the_papers_improvements_and_share() -> None:

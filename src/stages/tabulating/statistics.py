@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mammoreg.metrics.paper import METHODS, TABLE_5, TABLE_6, VOLUNTEER, paper_overlap_percent, paper_summary
+from mammoreg.metrics.paper import METHODS, TABLE_3, TABLE_5, TABLE_6, paper_overlap_percent, paper_summary
 from mammoreg.metrics.summary import Summary, summarise
 from stages.tabulating.layout import Row
 
@@ -35,7 +35,7 @@ def groups(table_5: Sequence[Row], table_6: Sequence[Row], landmarks: Sequence[R
     one = [row for row in table_6 if "+" not in row["views"]]
     printed_5 = {m: (paper_summary(TABLE_5, m), paper_overlap_percent(TABLE_5, m)) for m in METHODS}
     printed_6 = {m: (paper_summary(TABLE_6, m), paper_overlap_percent(TABLE_6, m)) for m in METHODS}
-    volunteer = {method: (summary, None) for method, summary in VOLUNTEER.items()}
+    volunteer = {method: (summary, None) for method, summary in TABLE_3.items()}
     carried = [row for row in landmarks if row["view"] == "3D"]
     projected = [row for row in landmarks if row["view"] != "3D"]
     found = [
