@@ -12,7 +12,7 @@ from mammoreg.metrics.distances import breast_scale_mm
 from stages.artefact import Artefact, Fields, write_artefact
 from stages.contract import Subject
 from stages.run import run_stage
-from stages.studies import runtime
+from stages.studies import chain, runtime
 from stages.studies.comparison import view_results
 from tests.stages import synthetic_case as synthetic
 from tests.stages.pictured_case import write_pictured_case
@@ -67,14 +67,14 @@ def fake_run_stage(calls: list[tuple[str, Any]]) -> Any:
 
 def test_stages_get_the_main_run_s_settings_rows_and_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[tuple[str, Any]] = []
-    monkeypatch.setattr(runtime, "run_stage", fake_run_stage(calls))
-    plan = runtime.Plan(
+    monkeypatch.setattr(chain, "run_stage", fake_run_stage(calls))
+    plan = chain.Plan(
         Subject("case1", "L"),
         {"segment": [tmp_path / "s.h5"], "image_CC": [tmp_path / "cc.dcm"], "image_MLO": [tmp_path / "mlo.dcm"]},
         {"mesh": {"elements": 7, "max_volume_error": 0.1}},
         {"CC": {"thickness_mm": "60"}, "MLO": {}},
     )
-    done = runtime._run_chain(plan, 5, tmp_path / "5")
+    done = runtime._run_mesh(plan, 5, tmp_path / "5")
     given = {(name, call[2].view): call for name, call in calls}
     assert given["mesh", None][1] == {"elements": 5, "max_volume_error": 0.1}
     assert given["pose", "CC"][0]["image"] == [tmp_path / "cc.dcm"]

@@ -3,14 +3,11 @@
 Its rows hold processor times, so that they alone of all artefacts differ from run to run.
 """
 
-import json
 import multiprocessing
 import resource
 import tempfile
-import time
-from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +16,7 @@ from pydantic import Field
 from stages.artefact import Artefact, Fields
 from stages.contract import Inputs, SettingsModel, Stage, Subject
 from stages.methods import METHODS
-from stages.registry import STAGE_MODULES, VIEW_STAGES, load_stage
-from stages.run import run_stage
+from stages.studies.chain import Done, Plan, plan_of, run_chain
 from stages.studies.comparison import view_results
 
 CHAIN = ("mesh", "pose", "compress", "shape", "solve", "localize", "evaluate")
@@ -38,82 +34,32 @@ class Settings(SettingsModel):
 
 
 @dataclass(frozen=True)
-class Plan:
-    """What every mesh of a case runs with: input paths by name, settings and table rows of the main run."""
-
-    subject: Subject
-    inputs: Mapping[str, list[Path]]
-    settings: Mapping[str, dict[str, Any]]
-    rows: Mapping[str, dict[str, str]]
-
-
-@dataclass
 class Run:
-    """One mesh's artefacts by stage and processor seconds by (stage, view); view "" for the whole case."""
+    """One mesh: its elements a side, what ran, and the most memory that it took."""
 
     elements: int
-    artefacts: dict[str, list[Path]] = field(default_factory=dict)
-    seconds: dict[tuple[str, str], float] = field(default_factory=dict)
-    peak_mb: float = 0.0
+    done: Done
+    peak_mb: float
 
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Run the case once per mesh and compare predictions with the truth and with the finest mesh."""
-    plan = _plan(inputs, subject)
+    plan = plan_of(inputs, subject, _GIVEN, CHAIN)
     with tempfile.TemporaryDirectory() as folder:
         runs = [_in_own_process(plan, n, Path(folder) / str(n)) for n in sorted(settings.elements)]
         rows = [row for one in runs for row in _rows(plan, one, runs[-1])]
     return Fields(values={"rows": rows})
 
 
-def _plan(inputs: Inputs, subject: Subject) -> Plan:
-    """The main run's own settings, so that the study differs from it by the mesh alone."""
-    artefacts = {name: inputs.artefacts(name) for name in (*_GIVEN, *CHAIN)}
-    settings = {name: json.loads(found[0].attrs["settings"]) for name, found in artefacts.items() if found}
-    rows = {str(pose.view): json.loads(pose.attrs["row"]) for pose in artefacts["pose"]}
-    paths = {name: [a.path for a in artefacts[name]] for name in _GIVEN if artefacts[name]}
-    paths |= {name: [path] for name, path in inputs.files.items()}
-    return Plan(subject, paths, settings, dict(sorted(rows.items())))
-
-
 def _in_own_process(plan: Plan, elements: int, folder: Path) -> Run:
     """A process of its own, so that its memory is that of this mesh."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("fork")) as pool:
-        return pool.submit(_run_chain, plan, elements, folder).result()
+        return pool.submit(_run_mesh, plan, elements, folder).result()
 
 
-def _run_chain(plan: Plan, elements: int, folder: Path) -> Run:
-    done = Run(elements)
-    for stage in CHAIN:
-        for view in plan.rows if stage in VIEW_STAGES else ("",):
-            output = folder / (f"{stage}.{view}.h5" if view else f"{stage}.h5")
-            settings = dict(plan.settings.get(stage, {}))
-            if stage == "mesh":
-                settings["elements"] = elements
-            subject = Subject(
-                plan.subject.case,
-                plan.subject.laterality,
-                view or None,
-                plan.rows[view] if view else plan.subject.row,
-            )
-            start = time.process_time()
-            run_stage(stage, _inputs_of(stage, view, plan, done), output, settings, subject)
-            done.seconds[stage, view] = time.process_time() - start
-            done.artefacts.setdefault(stage, []).append(output)
-    done.peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / _KIB_PER_MB
-    return done
-
-
-def _inputs_of(stage: str, view: str, plan: Plan, done: Run) -> dict[str, Sequence[Path]]:
-    """What a stage takes: artefacts of this mesh, and the main run's for what the mesh does not change."""
-    record, found = load_stage(stage), dict[str, Sequence[Path]]()
-    for name in (*record.inputs, *record.optional):
-        if name in STAGE_MODULES:
-            paths = done.artefacts.get(name, plan.inputs.get(name, []))
-            found[name] = [p for p in paths if not view or name not in VIEW_STAGES or p.name == f"{name}.{view}.h5"]
-        else:
-            found[name] = plan.inputs.get(f"{name}_{view}" if view and name in _VIEW_FILES else name, [])
-    return {name: paths for name, paths in found.items() if paths}
+def _run_mesh(plan: Plan, elements: int, folder: Path) -> Run:
+    done = run_chain(plan, CHAIN, folder, {"mesh": {"elements": elements}})
+    return Run(elements, done, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / _KIB_PER_MB)
 
 
 def _rows(plan: Plan, one: Run, finest: Run) -> list[dict[str, Any]]:
@@ -123,8 +69,8 @@ def _rows(plan: Plan, one: Run, finest: Run) -> list[dict[str, Any]]:
         results = view_results(view, *(_opened(run, view) for run in (one, finest)))
         for method in METHODS:
             error, discretisation = results.get(method, (None, None))
-            solve = sum(one.seconds[stage, view] for stage in MECHANICS.get(method, ()))
-            total = one.seconds["mesh", ""] + one.seconds["pose", view] + solve
+            solve = sum(one.done.seconds[stage, view] for stage in MECHANICS.get(method, ()))
+            total = one.done.seconds["mesh", ""] + one.done.seconds["pose", view] + solve
             rows.append(
                 {
                     "view": view,
@@ -145,7 +91,7 @@ def _rows(plan: Plan, one: Run, finest: Run) -> list[dict[str, Any]]:
 def _opened(one: Run, view: str) -> dict[str, Artefact]:
     """Artefacts of one mesh that tell about a view."""
     wanted = {"localize": "localize.h5", "evaluate": "evaluate.h5", "pose": f"pose.{view}.h5"}
-    paths = {path.name: path for found in one.artefacts.values() for path in found}
+    paths = {path.name: path for found in one.done.artefacts.values() for path in found}
     return {stage: Artefact(paths[name]) for stage, name in wanted.items()}
 
 
