@@ -10,7 +10,7 @@ from mammoreg.localization.deformation import ReferenceMesh
 from mammoreg.meshing.block import BlockMesh
 from stages.artefact import Artefact, Fields
 from stages.contract import Inputs, SettingsModel, Stage, Subject
-from stages.localizing.compressed import predict_in_compressed
+from stages.localizing.compressed import predict_in_compressed, second_volume
 from stages.localizing.mammogram import predict_in_mammograms
 from stages.localizing.mr import Anatomy, predict_in_mr
 from stages.localizing.views import CaseViews, case_views
@@ -18,7 +18,6 @@ from stages.marks import mr_landmarks, mr_lesions, view_areas, view_lesion_names
 from stages.methods import block_mesh
 
 _SKIN_PARTS = 6
-_SKIN_PARTS_OF_FIT = 2
 
 
 class Settings(SettingsModel):
@@ -39,7 +38,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     parts = [
         _to_mammograms(inputs, views, segment.laterality),
         _to_mr(inputs, views, segment, _skin(block, _SKIN_PARTS)),
-        _to_compressed(inputs, views, segment, _skin(block, _SKIN_PARTS_OF_FIT)),
+        _to_compressed(inputs, views, segment, block),
     ]
     return _joined(parts, per_view)
 
@@ -65,13 +64,12 @@ def _to_mr(inputs: Inputs, views: CaseViews, segment: Artefact, skin: Points) ->
     return predict_in_mr(views, anatomy, names_of, {v: view_areas(inputs, pose) for v, pose in views.poses.items()})
 
 
-def _to_compressed(inputs: Inputs, views: CaseViews, segment: Artefact, skin: Points) -> Fields:
+def _to_compressed(inputs: Inputs, views: CaseViews, segment: Artefact, block: BlockMesh) -> Fields:
     """Reads `mr_landmarks` and the mask of the second volume alone."""
-    if "compressed_mask" not in segment.volume_names():
+    second = second_volume(segment, block)
+    if second is None:
         return Fields()
-    compressed = segment.volume("compressed_mask").between_lps_and_breast(segment.laterality)
-    landmarks = _landmarks(inputs, segment.laterality)
-    return predict_in_compressed(views, compressed, skin, landmarks, segment.laterality)
+    return predict_in_compressed(views, second, _landmarks(inputs, segment.laterality), segment.laterality)
 
 
 def _landmarks(inputs: Inputs, laterality: Laterality) -> dict[str, Points]:
