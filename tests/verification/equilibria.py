@@ -12,8 +12,6 @@ from mammoreg.fem.model import HyperelasticModel
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 TIGHT = NewtonOptions(residual=1e-10, increment_mm=1e-9, iterations=30)
-GAUSS = np.array([-(0.6**0.5), 0.0, 0.6**0.5])
-GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 9.0
 
 
 @dataclass(frozen=True)
