@@ -45,10 +45,10 @@ class ElementState:
 
     @property
     def deviator(self) -> Array:
-        """Deviatoric Kirchhoff stress (E, Q, 3, 3), kPa."""
+        """Deviatoric Kirchhoff stress (E, Q, 6), kPa: 11, 22, 33, 12, 23, 31."""
         stress = np.concatenate([np.linalg.inv(run.inverse) @ run.stress for run in self.runs])
-        trace = np.concatenate([run.trace for run in self.runs])
-        return np.asarray(stress - (trace / 3.0)[..., None, None] * np.eye(3))
+        stress -= np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3.0 * np.eye(3)
+        return np.asarray(stress[..., [0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]])
 
 
 @dataclass(frozen=True)
