@@ -21,7 +21,8 @@ def placed_again(mesh: Artefact, compress: Artefact) -> PlacedBreast:
     """The breast as `compress` had it before the plates closed."""
     mechanics = Mechanics.model_validate(compress.value("mechanics"))
     angle_deg, mu_kpa = float(compress.value("angle_deg")), float(compress.value("mu_kpa"))
-    return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, kept_gland_share(compress))
+    gland, compression = kept_gland_share(compress), float(compress.value("compression"))
+    return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland, compression)
 
 
 def closing_plates(

@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 from pydantic import Field
 
+from mammoreg.contact.soft import touching
 from mammoreg.fem.closing import Closed, ClosingOptions
+from mammoreg.geometry import ViewGeometry, breast_to_plate
+from mammoreg.meshing.block import BlockMesh
 from stages.closing import closing_plates, kept_arrays, kept_values
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.mechanics import Mechanics, place_breast
@@ -30,15 +33,16 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     view = view_geometry(pose)
     lower_mm = view.height_mm if pose.value("plates_known") else None
     mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
+    gland = gland_share(inputs) if settings.mechanics.tells_gland_from_fat else None
+    mesh = block_mesh(inputs.artefact("mesh"))
+    compression = _compression(mesh, view, settings.mechanics)
+    breast = place_breast(mesh, view.angle_deg, settings.mechanics, mu_kpa, gland, compression)
     options = replace(
         ClosingOptions(),
         steps=settings.load_steps,
         tolerance_mm=settings.tolerance_mm,
-        penalty_per_mm=settings.penalty_per_mm,
+        penalty_per_mm=settings.penalty_per_mm * breast.stiffening,
     )
-    gland = gland_share(inputs) if settings.mechanics.tells_gland_from_fat else None
-    mesh = block_mesh(inputs.artefact("mesh"))
-    breast = place_breast(mesh, view.angle_deg, settings.mechanics, mu_kpa, gland)
     closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options, lower_mm)
     closed = closing.close(view.thickness_mm)
     # The floating breast is placed where the pose has seen the plates.
@@ -58,9 +62,18 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             "known_lower_mm": lower_mm,
             "raised_mm": closed.state.height,
             "uncompressed_mm": closing.uncompressed_mm,
+            "compression": compression,
+            "stiffening": breast.stiffening,
             **kept_values(settings.mechanics, options, mu_kpa, view.angle_deg),
         },
     )
+
+
+def _compression(mesh: BlockMesh, view: ViewGeometry, mechanics: Mechanics) -> float:
+    """Share of the thickness between the plates that they take away."""
+    skin = breast_to_plate(mesh.points[mesh.skin_nodes()], view.angle_deg)
+    low, high = touching(skin, view.edge_p_mm if mechanics.plates_end else None, mechanics.lip_radius_mm)
+    return max(0.0, 1.0 - view.thickness_mm / (high - low))
 
 
 def solve_report(closed: Closed) -> dict[str, Value]:

@@ -1,18 +1,18 @@
 """Mechanics that the stages pose, compress and solve share: settings, model and back of a breast in the plate frame."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from mammoreg.fem.boundary import BackCondition, back_condition
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.geometry import breast_to_plate
-from mammoreg.materials.elastic import neo_hookean
 from mammoreg.meshing.block import BlockMesh
 from stages.contract import SettingsModel
+from stages.tissue import MaterialName, Tissue, catalogue_tissue, neo_hookean_tissue
 
 Floats = NDArray[np.float64]
 
@@ -20,9 +20,23 @@ Floats = NDArray[np.float64]
 class Mechanics(SettingsModel):
     """Tissue, plates and the condition at the breast's back."""
 
-    poisson_ratio: float = Field(0.495, ge=0.3, le=0.4999, description="Poisson's ratio of breast tissue")
+    material: MaterialName = Field(
+        "homogeneous",
+        description="homogeneous: neo-Hookean, scaled by `calibrate`; else fat and gland as segmented, mixed in each "
+        "element, by that one of the paper's models (Table II), whose stiffness is its own",
+    )
+    poisson_ratio: float = Field(
+        0.495,
+        ge=0.3,
+        le=0.4999,
+        description="Poisson's ratio of breast tissue: gives the bulk modulus, of another material than homogeneous "
+        "for each tissue's stiffness at the view's compression",
+    )
     gland_contrast: float = Field(
-        1.0, ge=0.1, le=1000.0, description="shear modulus of gland over fat; 1 is the paper's homogeneous tissue"
+        1.0,
+        ge=0.1,
+        le=1000.0,
+        description="shear modulus of gland over fat in homogeneous material; 1 is the paper's homogeneous tissue",
     )
     fibre_ratio: float = Field(
         1.0,
@@ -58,7 +72,16 @@ class Mechanics(SettingsModel):
     @property
     def tells_gland_from_fat(self) -> bool:
         """Whether the material needs the tissue map."""
-        return self.gland_contrast != 1.0
+        return self.material != "homogeneous" or self.gland_contrast != 1.0
+
+    @model_validator(mode="after")
+    def _contrast_of_one_material(self) -> Self:
+        if self.material != "homogeneous" and self.gland_contrast != 1.0:
+            raise ValueError(
+                f"gland_contrast {self.gland_contrast:g} belongs to material homogeneous, but material is "
+                f"{self.material}, which knows its gland; leave gland_contrast at 1"
+            )
+        return self
 
 
 @dataclass(frozen=True)
@@ -69,15 +92,22 @@ class PlacedBreast:
         model: elements and material.
         back: condition of its back.
         skin_quads: faces of its skin.
+        stiffening: shear modulus at the compression to come over the initial one.
     """
 
     model: HyperelasticModel
     back: BackCondition
     skin_quads: NDArray[np.int64]
+    stiffening: float = 1.0
 
 
 def place_breast(
-    mesh: BlockMesh, angle_deg: float, mechanics: Mechanics, mu_kpa: float, gland: Floats | None = None
+    mesh: BlockMesh,
+    angle_deg: float,
+    mechanics: Mechanics,
+    mu_kpa: float,
+    gland: Floats | None = None,
+    compression: float = 0.0,
 ) -> PlacedBreast:
     """Turn a breast to a projection angle and give it tissue.
 
@@ -87,25 +117,25 @@ def place_breast(
         mechanics: settings.
         mu_kpa: shear modulus of the homogeneous tissue, the volume's mean where gland differs from fat.
         gland: share of gland per element (E,), where the material tells gland from fat.
+        compression: share of its thickness that the plates will take, for a material of the catalogue.
 
     Raises:
         ValueError: the material tells gland from fat and their shares are not given.
     """
     points = breast_to_plate(mesh.points, angle_deg)
-    mu: float | Floats = mu_kpa
-    if mechanics.tells_gland_from_fat:
-        if gland is None:
-            raise ValueError("a material that tells gland from fat needs the share of gland in each element")
-        relative = 1.0 + (mechanics.gland_contrast - 1.0) * gland
-        mu = mu_kpa * relative / float(relative.mean())
-    fibre = fibre_kpa = None
+    tissue = _tissue(mechanics, mu_kpa, gland, compression)
     if mechanics.fibre_ratio > 0.0:
-        fibre, fibre_kpa = _nipple_axis(mesh, angle_deg), mechanics.fibre_ratio * mu_kpa
-    material = neo_hookean(mu, mechanics.poisson_ratio, fibre, fibre_kpa)
-    model = HyperelasticModel(points, mesh.hexes(), material)
-    shear = mu_kpa / mechanics.back_layer_mm
+        tissue = tissue.with_fibres(_nipple_axis(mesh, angle_deg), mechanics.fibre_ratio)
+    model = HyperelasticModel(points, mesh.hexes(), tissue.material)
+    shear = tissue.mu_kpa / mechanics.back_layer_mm
     back = back_condition(mechanics.back, points, mesh.back_quads(), shear, along_kpa_per_mm=shear)
-    return PlacedBreast(model, back, mesh.skin_quads())
+    return PlacedBreast(model, back, mesh.skin_quads(), tissue.stiffening)
+
+
+def _tissue(mechanics: Mechanics, mu_kpa: float, gland: Floats | None, compression: float) -> Tissue:
+    if mechanics.material == "homogeneous":
+        return neo_hookean_tissue(mu_kpa, mechanics.poisson_ratio, mechanics.gland_contrast, gland)
+    return catalogue_tissue(mechanics.material, mechanics.poisson_ratio, gland, compression)
 
 
 def _nipple_axis(mesh: BlockMesh, angle_deg: float) -> Floats:

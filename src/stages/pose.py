@@ -26,7 +26,9 @@ NOT_DRAWN = "breast not drawn to the second volume's outline, for the coarse com
 class Settings(SettingsModel):
     """Search for the pose with a coarse compression."""
 
-    mechanics: Mechanics = Field(Mechanics(), description="tissue, plates and back of the coarse compression")
+    mechanics: Mechanics = Field(
+        Mechanics(), description="plates and back of the coarse compression; its tissue is homogeneous"
+    )
     angle_step_deg: float = Field(
         4.0, ge=0.0, le=20.0, description="distance of the angles tried, degrees; 0 keeps the header's angle"
     )

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from mammoreg.fem.closing import Closed, Closing
@@ -45,13 +46,13 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         facets,
         floating,
         outline,
-        settings.tie_stiffness,
+        settings.tie_stiffness * float(compress.value("stiffening")),
         settings.rounds,
         settings.settled_mm,
     )
     values = {"rounds": found.rounds, **_misfit("before", found.before), **_misfit("after", found.after)}
     values |= {
-        "contact_drift_mm": _drift(closing, closed, found.closed),
+        "contact_drift_mm": _drift(closing, mesh.skin_quads(), closed, found.closed),
         "penetration_mm": found.closed.penetration_mm,
         "volume_change": found.closed.volume_change,
     }
@@ -70,9 +71,9 @@ def _misfit(when: str, state: Alignment) -> dict[str, Value]:
     }
 
 
-def _drift(closing: Closing, before: Closed, after: Closed) -> float:
+def _drift(closing: Closing, skin_quads: NDArray[np.int64], before: Closed, after: Closed) -> float:
     """Largest motion along the compression of skin nodes that lay on the plates' flat faces, mm."""
-    skin = np.unique(closing.contact.surface.quads)
+    skin = np.unique(skin_quads)
     flat = skin if closing.edge is None else skin[before.deformed[skin, 1] < closing.edge - closing.lip]
     height = before.deformed[flat, 2] - before.height_mm
     touching = (height < 1.0) | (height > before.gap_mm - 1.0)

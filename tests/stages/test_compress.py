@@ -134,6 +134,20 @@ def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain,
         _with(inputs, tmp_path, gland_contrast=2.0)
 
 
+@pytest.mark.parametrize("material", ["wellman", "bakic"])
+def test_the_paper_s_tissues_are_pressed_with_the_same_plates(inputs, segment, plain, tmp_path, material):
+    got = _with(inputs | {"segment": segment}, tmp_path, material=material, fibre_ratio=0.0)
+    assert got.value("thickness_mm") == plain.value("thickness_mm")
+    assert abs(got.value("volume_change")) < 0.01
+    assert got.value("min_det_f") > 0.2
+    assert 0.2 < got.value("compression") < 0.6
+    stiffer = {"wellman": got.value("stiffening") > 2.0, "bakic": 0.5 < got.value("stiffening") < 1.0}
+    assert stiffer[material]
+    heights = _nodes(got)[_nodes(got)[:, 1] < EDGE - 8.0, 2] - got.value("height_mm")
+    assert heights.min() > -1.0
+    assert heights.max() < GAP + 1.0
+
+
 def test_force_scales_with_the_stiffness(inputs, plain, tmp_path):
     soft = write_start(tmp_path, mu_kpa=4.7)["calibrate"]
     got = run("compress", tmp_path / "out", inputs | {"calibrate": soft})

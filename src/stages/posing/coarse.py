@@ -21,11 +21,11 @@ def coarse_compression(
 
     Args:
         mesh: undeformed, breast frame.
-        mechanics: settings; gland and fat are alike here.
+        mechanics: settings; all tissue is homogeneous here.
         mu_kpa: shear modulus.
         plates_known: the plates stand at the view's height, which a second volume shows.
     """
-    alike = mechanics.model_copy(update={"gland_contrast": 1.0})
+    alike = mechanics.model_copy(update={"material": "homogeneous", "gland_contrast": 1.0})
 
     def compress(view: ViewGeometry) -> Compressed | None:
         breast = place_breast(mesh, view.angle_deg, alike, mu_kpa)

@@ -1,7 +1,7 @@
 """How the results came about: a paragraph to quote, settings and versions."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
@@ -22,7 +22,7 @@ METHODS_TEXT = (
     "registration of X-ray mammograms and MR images of the female breast. The breast was segmented in the MR volume "
     "and meshed with {elements} hexahedra by transfinite interpolation. The projection angle and the imaged portion "
     "of the breast were estimated from the outline of the mammogram, with the header's angle as prior. The breast "
-    "was compressed as a nearly incompressible neo-Hookean body ({mechanics}) between two rigid plates to the "
+    "was compressed as a nearly incompressible {tissue} body ({mechanics}) between two rigid plates to the "
     "thickness given in the mammogram's header or, without it, estimated from the image (method plate). Its surface "
     "was then adapted to the outline of the mammogram, and the interior was solved anew under the displacements of "
     "that surface (method updated). Lesions and landmarks marked in the MR volume were carried through the "
@@ -39,13 +39,21 @@ def methods_paragraph(artefacts: Sequence[Artefact]) -> str:
     meshes = sorted({int(a.value("n")) for a in artefacts if a.stage == "mesh" and a.has("n")})
     elements = " or ".join(f"{n} x {n} x {n}" for n in meshes) or "n x n x n"
     versions = sorted({a.attrs["package_version"] for a in artefacts if "package_version" in a.attrs})
-    return METHODS_TEXT.format(version=", ".join(versions), elements=elements, mechanics=_mechanics(artefacts))
+    settings = _mechanics_settings(artefacts)
+    material = settings.get("material", "homogeneous")
+    tissue = "neo-Hookean" if material == "homogeneous" else f"hyperelastic (fat and gland after {material.title()})"
+    return METHODS_TEXT.format(
+        version=", ".join(versions), elements=elements, tissue=tissue, mechanics=_mechanics(settings)
+    )
 
 
-def _mechanics(artefacts: Sequence[Artefact]) -> str:
-    """Tissue and plates of the compression in words."""
+def _mechanics_settings(artefacts: Sequence[Artefact]) -> dict[str, Any]:
     found = [json.loads(a.attrs["settings"]) for a in artefacts if a.stage == "compress" and "settings" in a.attrs]
-    settings = found[0].get("mechanics", {}) if found else {}
+    return dict(found[0].get("mechanics", {})) if found else {}
+
+
+def _mechanics(settings: Mapping[str, Any]) -> str:
+    """Tissue and plates of the compression in words."""
     texts = [form.format(settings[key]) for key, form in _MECHANICS.items() if settings.get(key)]
     return ", ".join(texts) or "homogeneous"
 

@@ -98,8 +98,10 @@ def _opened(one: Run, view: str) -> dict[str, Artefact]:
 def _material(plan: Plan) -> str:
     """The material of the main run in words."""
     mechanics = plan.settings.get("compress", {}).get("mechanics", {})
-    tissue = "homogeneous" if mechanics.get("gland_contrast", 1.0) == 1.0 else "gland and fat"
-    return f"{tissue} neo-Hookean{' with fibres' if mechanics.get('fibre_ratio', 0.0) else ''}"
+    model = mechanics.get("material", "homogeneous")
+    contrasted = "homogeneous" if mechanics.get("gland_contrast", 1.0) == 1.0 else "gland and fat"
+    tissue = f"{contrasted} neo-Hookean" if model == "homogeneous" else model
+    return f"{tissue}{' with fibres' if mechanics.get('fibre_ratio', 0.0) else ''}"
 
 
 STAGE = Stage(
