@@ -87,7 +87,7 @@ def test_contact_tangent_is_the_derivative_of_its_force(friction: float) -> None
     contact, points = box_contact(friction)
     rng = np.random.default_rng(2)
     first = contact.terms(points, 0.0, PLATES, contact.start(points, PLATES, 0.0))
-    memory = contact.remember(points, PLATES, 0.0, first)
+    memory = contact.remember(points, PLATES, 0.0, first, contact.start(points, PLATES, 0.0))
     nodes = points + rng.uniform(-0.8, 0.8, points.shape)
     direction, lift = rng.standard_normal(nodes.shape), 0.7
     faces = 3 * contact.surface.quads[:, :, None] + np.arange(3)
@@ -108,7 +108,7 @@ def test_friction_stays_in_its_cone_and_opposes_the_slip() -> None:
     contact, points = box_contact(0.25)
     plates = (Plate(-24.0, 1), Plate(24.0, -1))
     first = contact.terms(points, 0.0, plates, contact.start(points, plates, 0.0))
-    memory = contact.remember(points, plates, 0.0, first)
+    memory = contact.remember(points, plates, 0.0, first, contact.start(points, plates, 0.0))
     touched = first.pressure > 0.0
     for slip, sliding in ((0.1, False), (5.0, True)):
         terms = contact.terms(points + np.array([slip, 0.0, 0.0]), 0.0, plates, memory)

@@ -5,18 +5,26 @@ is zero beyond a band above the plate, quadratic within it and linear below, so 
 takes its limit from the pressure of the last converged step: then both have potentials, the tangent is symmetric and
 Newton's method does not chatter between sticking and slipping. Terms are per face with the plates' common height as
 13th degree of freedom.
+
+What the barrier's finite stiffness lets through is taken back by augmentation: each point's distance is shifted so
+that the plate presses as hard with the point on its face (a multiplier, written as a shift). Sticking is friction
+without a limit: a point that presses stays where it first pressed, its traction being augmented likewise.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.contact.plate import Array, Plate
+from mammoreg.contact.plate import Array, Gap, Plate
 from mammoreg.contact.surface import ContactSurface
 
 STICKING_PRESSURE_KPA = 0.1  # gives friction a little stiffness where there was no pressure yet
+
+
+NONE: Array = np.zeros(0)
+"""State that a contact does not need."""
 
 
 @dataclass(frozen=True)
@@ -24,14 +32,16 @@ class SoftMemory:
     """What contact points remember of each plate since the last converged step (first axis: plates).
 
     Attributes:
-        anchor: places relative to the plates (plates, F, q, 3), mm.
-        traction: friction (plates, F, q, 3), kPa.
-        pressure: normal pressure (plates, F, q), kPa.
+        anchor: places relative to the plates (plates, F, q, 3), mm; empty without friction.
+        traction: friction (plates, F, q, 3), kPa; empty without friction.
+        pressure: normal pressure (plates, F, q), kPa; empty without friction.
+        shift: added to the distances (plates, F, q), mm; empty without augmentation.
     """
 
     anchor: Array
     traction: Array
     pressure: Array
+    shift: Array = field(default_factory=NONE.copy)
 
 
 @dataclass(frozen=True)
@@ -42,7 +52,7 @@ class SoftTerms:
         force: residual (F, 13), mN.
         stiffness: its derivative (F, 13, 13), mN/mm, symmetric.
         pressure: (plates, F, q), kPa.
-        traction: friction (plates, F, q, 3), kPa.
+        traction: friction (plates, F, q, 3), kPa; empty without friction.
         plate_force: of each plate on the body (plates, 3), mN.
         penetration_mm: deepest point inside a plate.
     """
@@ -63,7 +73,7 @@ class SoftContact:
         surface: contact points of the faces.
         stiffness: of the barrier, kPa/mm.
         band_mm: the pressure sets in this far above the plate.
-        friction: Coulomb coefficient.
+        friction: Coulomb coefficient; infinite: sticking.
         slip_mm: displacement at which friction reaches its limit.
     """
 
@@ -77,39 +87,88 @@ class SoftContact:
         """The same contact, stiffer by a factor; its onset shrinks alike, which keeps the pressure at the plate."""
         return replace(self, stiffness=factor * self.stiffness, band_mm=self.band_mm / factor)
 
-    def start(self, nodes: Array, plates: Sequence[Plate], height: float) -> SoftMemory:
-        """Memory of a body that has not touched yet, at nodes (N, 3)."""
-        anchor = self._relative(nodes, plates, height)
-        return SoftMemory(anchor, np.zeros_like(anchor), np.zeros(anchor.shape[:-1]))
+    @property
+    def sticks(self) -> bool:
+        """Whether friction has no limit."""
+        return np.isinf(self.friction)
 
-    def remember(self, nodes: Array, plates: Sequence[Plate], height: float, terms: SoftTerms) -> SoftMemory:
-        """Memory after a converged step."""
-        return SoftMemory(self._relative(nodes, plates, height), terms.traction, terms.pressure)
+    def start(self, nodes: Array, plates: Sequence[Plate], height: float) -> SoftMemory:
+        """Memory of a body that has not pressed yet, at nodes (N, 3); where it touches already, sticking begins."""
+        if self.friction == 0.0:
+            return SoftMemory(NONE, NONE, NONE)
+        anchor = self._relative(nodes, plates, height)
+        pressure = np.zeros(anchor.shape[:-1])
+        if self.sticks:
+            points = self._points(nodes, height)
+            pressure = np.stack([self._barrier(plate.gap(points).distance)[0] for plate in plates])
+        return SoftMemory(anchor, np.zeros_like(anchor), pressure)
+
+    def remember(
+        self, nodes: Array, plates: Sequence[Plate], height: float, terms: SoftTerms, before: SoftMemory
+    ) -> SoftMemory:
+        """Memory after a converged step that began with the memory `before`."""
+        if self.friction == 0.0:
+            return replace(before)
+        anchor, traction = self._relative(nodes, plates, height), terms.traction
+        if self.sticks:
+            pressing = terms.pressure > 0.0
+            anchor = np.where((pressing & (before.pressure > 0.0))[..., None], before.anchor, anchor)
+            traction = np.where(pressing[..., None], traction, 0.0)
+        return SoftMemory(anchor, traction, terms.pressure, before.shift)
+
+    def augmented(self, nodes: Array, plates: Sequence[Plate], height: float, memory: SoftMemory) -> SoftMemory:
+        """Memory whose shifts let each plate press as now with the points on its face, and no others."""
+        points = self._points(nodes, height)
+        distance = np.stack([self._distance(plate.gap(points), memory, k) for k, plate in enumerate(plates)])
+        return replace(memory, shift=np.minimum(distance, self.band_mm))
 
     def terms(self, nodes: Array, height: float, plates: Sequence[Plate], memory: SoftMemory) -> SoftTerms:
         """Forces and tangent at nodes (N, 3) with the plates raised by `height` mm."""
-        points = self.surface.positions(nodes) - np.array([0.0, 0.0, height])
+        points = self._points(nodes, height)
         relative = self._relative(nodes, plates, height) if self.friction > 0.0 else None
         total, tangent = np.zeros(points.shape), np.zeros((*points.shape, 3))
         pressures, tractions, forces, deepest = [], [], [], 0.0
         for k, plate in enumerate(plates):
             gap = plate.gap(points)
-            pressure, slope = self._barrier(gap.distance)
+            pressure, slope = self._barrier(self._distance(gap, memory, k))
             dyad = gap.normal[..., :, None] * gap.normal[..., None, :]
             tangent += slope[..., None, None] * dyad - pressure[..., None, None] * gap.hessian()
-            traction = np.zeros(points.shape)
+            force = pressure[..., None] * gap.normal
             if relative is not None:
-                slip = relative[k] - memory.anchor[k]
-                traction, stick = self._friction(dyad, memory.traction[k], memory.pressure[k], slip)
+                traction, stick = self._friction(dyad, memory, k, relative[k] - memory.anchor[k])
                 tangent += stick
-            force = (pressure[..., None] * gap.normal + traction) * self.surface.area[..., None]
+                force = force + traction
+                tractions.append(traction)
+            force = force * self.surface.area[..., None]
             total -= force
             pressures.append(pressure)
-            tractions.append(traction)
             forces.append(force.sum(axis=(0, 1)))
             deepest = max(deepest, -float(gap.distance.min()))
         force, stiffness = self._to_corners(total, tangent)
-        return SoftTerms(force, stiffness, np.stack(pressures), np.stack(tractions), np.stack(forces), deepest)
+        traction = np.stack(tractions) if tractions else NONE
+        return SoftTerms(force, stiffness, np.stack(pressures), traction, np.stack(forces), deepest)
+
+    def energy_mj(self, nodes: Array, height: float, plates: Sequence[Plate], memory: SoftMemory) -> float:
+        """Potential of the pressure and of friction with its lagged limit."""
+        points = self._points(nodes, height)
+        relative = self._relative(nodes, plates, height) if self.friction > 0.0 else None
+        density = np.zeros(points.shape[:-1])
+        for k, plate in enumerate(plates):
+            gap = plate.gap(points)
+            density += self._barrier_energy(self._distance(gap, memory, k))
+            if relative is not None:
+                dyad = gap.normal[..., :, None] * gap.normal[..., None, :]
+                density += self._friction_energy(dyad, memory, k, relative[k] - memory.anchor[k])
+        return 1e-3 * float((density * self.surface.area).sum())
+
+    def _points(self, nodes: Array, height: float) -> Array:
+        """Contact points (F, q, 3) as the plates see them that are raised by `height` mm."""
+        return self.surface.positions(nodes) - np.array([0.0, 0.0, height])
+
+    @staticmethod
+    def _distance(gap: Gap, memory: SoftMemory, k: int) -> Array:
+        """Distance (F, q) that the barrier of plate k takes."""
+        return gap.distance + memory.shift[k] if memory.shift.size else gap.distance
 
     def _relative(self, nodes: Array, plates: Sequence[Plate], height: float) -> Array:
         points = self.surface.positions(nodes)
@@ -122,18 +181,41 @@ class SoftContact:
         pressure = 0.5 * slope * depth + self.stiffness * np.maximum(-distance - self.band_mm, 0.0)
         return pressure, slope
 
-    def _friction(self, dyad: Array, old: Array, pressure: Array, slip: Array) -> tuple[Array, Array]:
-        """Radial return within a disc of lagged radius: traction (F, q, 3) and its stiffness (F, q, 3, 3)."""
+    def _barrier_energy(self, distance: Array) -> Array:
+        """Energy per area, mN/mm, whose derivative by the distance is minus the pressure."""
+        depth = np.clip(self.band_mm - distance, 0.0, 2.0 * self.band_mm)
+        beyond = np.maximum(-distance - self.band_mm, 0.0)
+        early = depth**3 / (12.0 * self.band_mm)
+        return np.asarray(self.stiffness * (early + beyond * (self.band_mm + 0.5 * beyond)))
+
+    def _limit(self, pressure: Array) -> tuple[Array, Array]:
+        """Limit of friction (F, q), kPa, under a lagged pressure, and its stiffness while it sticks, kPa/mm."""
+        if self.sticks:
+            pressing = pressure > 0.0
+            return np.where(pressing, np.inf, 0.0), np.where(pressing, self.stiffness, 0.0)
         limit = self.friction * pressure
-        stick = np.maximum(limit, self.friction * STICKING_PRESSURE_KPA) / self.slip_mm
+        return limit, np.maximum(limit, self.friction * STICKING_PRESSURE_KPA) / self.slip_mm
+
+    def _friction(self, dyad: Array, memory: SoftMemory, k: int, slip: Array) -> tuple[Array, Array]:
+        """Radial return within a disc of lagged radius: traction (F, q, 3) and its stiffness (F, q, 3, 3)."""
+        limit, stick = self._limit(memory.pressure[k])
         plane = np.eye(3) - dyad
-        trial = np.einsum("fqij,fqj->fqi", plane, old - stick[..., None] * slip)
+        trial = np.einsum("fqij,fqj->fqi", plane, memory.traction[k] - stick[..., None] * slip)
         size = np.linalg.norm(trial, axis=-1)
         safe = np.where(size > 0.0, size, 1.0)
-        share = np.where(size > limit, limit / safe, 1.0)
+        slides = size > limit
+        share = np.where(slides, np.where(slides, limit, 0.0) / safe, 1.0)
         direction = trial / safe[..., None]
-        along = np.where((size > limit)[..., None, None], direction[..., :, None] * direction[..., None, :], 0.0)
+        along = np.where(slides[..., None, None], direction[..., :, None] * direction[..., None, :], 0.0)
         return trial * share[..., None], (share * stick)[..., None, None] * (plane - along)
+
+    def _friction_energy(self, dyad: Array, memory: SoftMemory, k: int, slip: Array) -> Array:
+        """Potential per area, mN/mm, of `_friction` on a flat face."""
+        limit, stick = self._limit(memory.pressure[k])
+        trial = np.einsum("fqij,fqj->fqi", np.eye(3) - dyad, memory.traction[k] - stick[..., None] * slip)
+        size = np.linalg.norm(trial, axis=-1)
+        within = np.minimum(size, limit)
+        return np.asarray(within * (size - 0.5 * within) / np.where(stick > 0.0, stick, np.inf))
 
     def _to_corners(self, force: Array, stiffness: Array) -> tuple[Array, Array]:
         faces, shape = len(self.surface.quads), self.surface.shape

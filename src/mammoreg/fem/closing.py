@@ -21,7 +21,10 @@ LEAST_GUESS_DET = 0.2  # an affine guess that squeezes an element further is not
 STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
 REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
 HARDER = 10.0  # a step that fails is tried again with this much more damping
+PATIENCE = 4  # a breast that does not rest yet gets so many times the steps
 RESTLESS_MM = 1.0  # a breast that still moves further in its last step has not come to rest
+LARGEST_UNBALANCE = 0.02  # of unbalanced to internal forces at rest, without damping
+LARGEST_PENETRATION = 0.2  # of the plates' gap
 
 
 @dataclass(frozen=True)
@@ -190,6 +193,17 @@ class Closing:
             step = min(1.5 * step, 1.0 / self.options.steps)
         return self._settled(equilibrium, state, gap_mm, taken, cuts, self.options.damping)
 
+    def resume(self, state: DampedState, gap_mm: float) -> Closed:
+        """Come to rest at a gap from a state near the answer, such as that of a coarser mesh.
+
+        Raises:
+            NotConvergedError: with the reason.
+        """
+        stiffest = self.options.stiffening[-1] if self.options.stiffening else 1.0
+        stiff = self.equilibrium().with_contact(self.contact.stiffened(stiffest))
+        eased = self._eased(stiff, state, Load(self.plates(gap_mm)), self.options.damping)
+        return self._rested(stiff, eased, gap_mm, 1, 0, STIFF_DAMPING * self.options.damping)
+
     def rest(self, closed: Closed, outline: Part, damping: float) -> Closed:
         """Go on from a closed state with an outline drawing on the skin.
 
@@ -246,14 +260,16 @@ class Closing:
     ) -> Closed:
         load = Load(self.plates(gap_mm))
         tolerance, moved, factor = self.options.tolerance_mm, np.inf, damping
-        for _ in range(self.options.rests):
+        for rest in range(PATIENCE * self.options.rests):
+            if rest >= self.options.rests and moved <= RESTLESS_MM:
+                break
             try:
-                after = equilibrium.step(state, load, factor, tolerance)
+                after, reason = equilibrium.approach(state, load, factor, tolerance)
             except NotConvergedError:
                 cuts, factor = cuts + 1, HARDER * factor
                 continue
-            moved = float(np.abs(after.positions - state.positions).max())
-            state, factor = after, 0.25 * factor
+            moved = np.inf if reason else float(np.abs(after.positions - state.positions).max())
+            state, factor = after, factor if reason else 0.25 * factor
             if moved < 2.0 * tolerance and factor < REST_SHARE * damping:
                 break
         if not np.isfinite(moved) or moved > RESTLESS_MM:
@@ -270,7 +286,13 @@ class Closing:
         cuts: int,
         moved: float,
     ) -> Closed:
-        terms = equilibrium.terms(state, load.plates)
+        terms, unbalance = equilibrium.terms(state, load.plates), equilibrium.unbalance(state, load)
+        if unbalance > LARGEST_UNBALANCE:
+            raise NotConvergedError(f"forces at rest are out of balance by {unbalance:.1%}")
+        if terms.penetration_mm > LARGEST_PENETRATION * gap_mm:
+            raise NotConvergedError(
+                f"the skin passes the plates by {terms.penetration_mm:.1f} mm at a gap of {gap_mm:.1f} mm"
+            )
         count = len(self.model.points)
         forces = np.abs(terms.plate_force[:, 2]) * 1e-3
         return Closed(

@@ -16,14 +16,11 @@ from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, SoftMemory, SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
+from mammoreg.fem.damped_step import DampedStep
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.parts import Part, Parts, all_nodes, back_springs, parts_at
 from mammoreg.fem.sparse import Array, Integers
 from mammoreg.fem.system import NewtonSystem, node_dofs
-
-LEAST_DET_SHARE = 0.2  # a Newton step may shrink the smallest det F to this share of itself
-RUNAWAY_MM = 200.0
-ITERATIONS = 14
 
 
 @dataclass(frozen=True)
@@ -143,49 +140,34 @@ class DampedEquilibrium:
         Raises:
             NotConvergedError: elements turn inside out, or the updates do not become small.
         """
-        state = start
+        state, reason = self.approach(start, load, damping, tolerance_mm)
+        if reason:
+            raise NotConvergedError(reason)
+        return state
+
+    def approach(self, start: DampedState, load: Load, damping: float, tolerance_mm: float) -> tuple[DampedState, str]:
+        """As `step`, but a state nearer to the step's equilibrium is returned too, with what keeps it from being one.
+
+        Raises:
+            NotConvergedError: elements turn inside out.
+        """
+        lagged = self.parts if start.parts is None else start.parts
+        step = self._step(start, load, damping)
+        state, reason = step.solve(tolerance_mm)
+        terms = self.terms(state, load.plates)
+        memory = self.contact.remember(state.positions, load.plates, state.height, terms, start.memory)
+        parts = tuple(part.renewed(state.positions) for part in lagged)
+        return replace(state, memory=memory, parts=parts), reason
+
+    def unbalance(self, state: DampedState, load: Load) -> float:
+        """Ratio of unbalanced to internal forces at a state, without damping."""
+        return self._step(state, load, 0.0).unbalance(state)
+
+    def _step(self, start: DampedState, load: Load, damping: float) -> DampedStep:
         lagged = self.parts if start.parts is None else start.parts
         self._fit(lagged)
-        acting = parts_at((*self.springs, *lagged), load.share)
-        for _ in range(ITERATIONS):
-            update, pressure = self._newton(state, start, load.plates, acting, damping)
-            state, moved = self._moved(state, update, pressure)
-            if moved < tolerance_mm:
-                terms = self.terms(state, load.plates)
-                memory = self.contact.remember(state.positions, load.plates, state.height, terms)
-                return replace(state, memory=memory, parts=tuple(part.renewed(state.positions) for part in lagged))
-        raise NotConvergedError(f"no equilibrium within {ITERATIONS} Newton iterations")
+        return DampedStep(self, start, load, parts_at((*self.springs, *lagged), load.share), damping)
 
     def terms(self, state: DampedState, plates: Sequence[Plate]) -> SoftTerms:
         """Contact at a state."""
         return self.contact.terms(state.positions, state.height, plates, state.memory)
-
-    def _newton(
-        self, state: DampedState, start: DampedState, plates: Sequence[Plate], acting: Parts, damping: float
-    ) -> tuple[Array, Array]:
-        elements = self.model.state(state.positions)
-        internal = self.model.residual(elements, state.pressure)
-        contact = self.terms(state, plates)
-        moved = np.append((state.positions - start.positions).ravel(), state.height - start.height)
-        pairs = [part.terms(state.positions) for part in acting]
-        springs, others = pairs[: len(self.springs)], pairs[len(self.springs) :]
-        tangent = self.model.stiffness(elements, state.pressure, internal.coupling)
-        damped = (damping * self.weight * moved)[:, None], (damping * self.weight)[:, None, None]
-        groups = [(internal.force, tangent), *springs, (contact.force, contact.stiffness), damped, *others]
-        vectors, blocks = [vector for vector, _ in groups], [block for _, block in groups]
-        self.residuals.append(self.system.unbalance(vectors))
-        return self.system.increment(internal, vectors, blocks)
-
-    def _moved(self, state: DampedState, update: Array, pressure: Array) -> tuple[DampedState, float]:
-        """The state after an update, halved until no element collapses, and how far the whole update would go."""
-        largest = float(np.abs(update).max())
-        if largest > RUNAWAY_MM:
-            raise NotConvergedError("the Newton iteration runs away")
-        share = self.system.admissible(state.positions, update, LEAST_DET_SHARE)
-        moved = replace(
-            state,
-            positions=state.positions + share * update[:-1].reshape(-1, 3),
-            pressure=state.pressure + share * pressure,
-            height=state.height + share * float(update[-1]),
-        )
-        return moved, largest
