@@ -57,3 +57,15 @@ def test_values_that_are_not_finite_or_singular_are_refused() -> None:
     pytest.importorskip("pypardiso")
     with pytest.raises(NotConvergedError, match="not finite"):
         PardisoSolver(indptr, indices, True).solve(np.array([1.0, np.nan]), np.ones(2))
+
+
+@pytest.mark.parametrize("kind", [PardisoSolver, SuperLuSolver])
+def test_factors_serve_more_than_one_right_hand_side(kind: type[PardisoSolver] | type[SuperLuSolver]) -> None:
+    if kind is PardisoSolver:
+        pytest.importorskip("pypardiso")
+    solver = kind(np.array([0, 2, 3], dtype=np.int32), np.array([0, 1, 1], dtype=np.int32), True)
+    solver.factorise(np.array([2.0, 1.0, 3.0]))
+    matrix = np.array([[2.0, 1.0], [1.0, 3.0]])
+    for rhs in np.eye(2):
+        np.testing.assert_allclose(matrix @ solver.back_substitute(rhs), rhs, atol=1e-12)
+    assert solver.factorisations == 1

@@ -24,7 +24,11 @@ _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
 
 
 class PardisoSolver:
-    """PARDISO for one sparsity pattern (CSR, zero-based; the upper triangle if symmetric)."""
+    """PARDISO for one sparsity pattern (CSR, zero-based; the upper triangle if symmetric).
+
+    Attributes:
+        factorisations: so far.
+    """
 
     def __init__(self, indptr: Indices, indices: Indices, symmetric: bool) -> None:
         self._indptr, self._indices = np.ascontiguousarray(indptr), np.ascontiguousarray(indices)
@@ -39,18 +43,29 @@ class PardisoSolver:
         self._iparm[10] = self._iparm[12] = 0 if symmetric else 1  # scaling and matching
         self._iparm[20] = 1  # Bunch-Kaufman pivots
         self._iparm[34] = 1  # zero-based
-        self._analysed = False
+        self._analysed, self.factorisations = False, 0
         weakref.finalize(self, _release, self._handle, self._type, self._size, self._iparm.copy())
 
     def solve(self, values: Array, rhs: Array) -> Array:
         """Factorise the matrix with these entries and solve for one right-hand side."""
-        if not (np.isfinite(values).all() and np.isfinite(rhs).all()):
-            raise NotConvergedError("the linear system holds values that are not finite")
+        _refuse_infinite(values, rhs)
+        self.factorise(values)
+        return self._call(_SOLVE, self._values, rhs)
+
+    def factorise(self, values: Array) -> None:
+        """Factorise the matrix with these entries; the first time the pattern is analysed too."""
+        _refuse_infinite(values)
+        self._values, nothing = values, np.zeros(self._size)
         if not self._analysed:
-            self._call(_ANALYSE, values, rhs)
+            self._call(_ANALYSE, values, nothing)
             self._analysed = True
-        self._call(_FACTORISE, values, rhs)
-        return self._call(_SOLVE, values, rhs)
+        self._call(_FACTORISE, values, nothing)
+        self.factorisations += 1
+
+    def back_substitute(self, rhs: Array) -> Array:
+        """Solve for one more right-hand side with the factors at hand."""
+        _refuse_infinite(rhs)
+        return self._call(_SOLVE, self._values, rhs)
 
     def _call(self, phase: int, values: Array, rhs: Array) -> Array:
         solution = np.zeros(self._size)
@@ -96,17 +111,33 @@ class SuperLuSolver:
 
     def __init__(self, indptr: Indices, indices: Indices, symmetric: bool) -> None:
         self._indptr, self._indices, self._symmetric = indptr, indices, symmetric
+        self.factorisations = 0
 
     def solve(self, values: Array, rhs: Array) -> Array:
         """Factorise the matrix with these entries and solve for one right-hand side."""
+        self.factorise(values)
+        return self.back_substitute(rhs)
+
+    def factorise(self, values: Array) -> None:
+        """Factorise the matrix with these entries."""
         size = len(self._indptr) - 1
         matrix = sp.csr_array((values, self._indices, self._indptr), shape=(size, size))
         if self._symmetric:
             matrix = matrix + sp.triu(matrix, 1).T
         try:
-            return np.asarray(splu(sp.csc_array(matrix)).solve(rhs))
+            self._factors = splu(sp.csc_array(matrix))
         except RuntimeError as error:
             raise NotConvergedError(f"the linear solver failed ({error})") from error
+        self.factorisations += 1
+
+    def back_substitute(self, rhs: Array) -> Array:
+        """Solve for one more right-hand side with the factors at hand."""
+        return np.asarray(self._factors.solve(rhs))
+
+
+def _refuse_infinite(*arrays: Array) -> None:
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise NotConvergedError("the linear system holds values that are not finite")
 
 
 def linear_solver(indptr: Indices, indices: Indices, symmetric: bool) -> PardisoSolver | SuperLuSolver:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mammoreg.materials.fibres import Fibres
 from mammoreg.materials.isochoric import Array, IsochoricLaw
@@ -52,7 +53,7 @@ class ElasticMaterial:
         fibres = None if self.fibres is None else self.fibres.of_elements(count)
         return ElasticMaterial(mu, bulk, fibres, self.law)
 
-    def part(self, elements: slice) -> "ElasticMaterial":
+    def part(self, elements: slice | NDArray[np.integer]) -> "ElasticMaterial":
         """The material of some elements; needs one value per element."""
         law = self.law.part(elements) if isinstance(self.law, TissueMixture) else self.law
         fibres = None if self.fibres is None else self.fibres.part(elements)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mammoreg.materials.isochoric import Array
 
@@ -40,7 +41,7 @@ class Fibres:
             raise ValueError("a fibre's direction must have a length")
         return Fibres(direction / length, stiffness, self.stiffening)
 
-    def part(self, elements: slice) -> "Fibres":
+    def part(self, elements: slice | NDArray[np.integer]) -> "Fibres":
         """Fibres of some elements; needs one value per element."""
         stiffness = np.asarray(self.stiffness_kpa)[elements]
         return Fibres(self.direction[elements], stiffness, self.stiffening)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mammoreg.materials.isochoric import Array, IsochoricLaw
 
@@ -35,7 +36,7 @@ class TissueMixture:
         """Initial shear modulus (E,)."""
         return np.asarray(self.shares @ np.array([law.mu_kpa for law in self.laws]))
 
-    def part(self, elements: slice) -> "TissueMixture":
+    def part(self, elements: slice | NDArray[np.integer]) -> "TissueMixture":
         """The mixture of some elements."""
         return TissueMixture(self.laws, self.shares[elements])
 
