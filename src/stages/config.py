@@ -24,6 +24,12 @@ class CohortKeys(BaseModel):
         None, description="Table of the mammograms; null beside `cases`: a cohort without mammograms."
     )
     results: str = Field("results", min_length=1, description="Folder for all results.")
+    stability_scan: str | None = Field(
+        None,
+        min_length=1,
+        description="MR volume (NIfTI, or a folder that holds one DICOM series) whose breast is one of the shapes of the "
+        "study `stability`; null: its scenarios are listed as not run.",
+    )
 
     def table_files(self, project: Path) -> tuple[Path, Path | None]:
         """Both tables; those of the embedded cohort lie in the project's folder."""

@@ -10,7 +10,11 @@ from stages.errors import UserError
 CASE_STAGES = ("segment", "mesh", "localize", "evaluate", "figures")
 VIEW_STAGES = ("pose", "compress", "shape", "solve", "project")
 COHORT_STAGES = ("calibrate", "tables", "report")
-STUDIES = {"runtime": "case", "error_vs_runtime": "cohort"}
+STUDIES = {
+    "runtime": "case",
+    "error_vs_runtime": "cohort",
+    **dict.fromkeys(("stability_scan_mesh", "stability_batch", "stability"), "cohort"),
+}
 STAGE_MODULES = {name: f"stages.{name}" for name in ("digital", *CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES)} | {
     name: f"stages.studies.{name}" for name in STUDIES
 }

@@ -52,3 +52,86 @@ rule error_vs_runtime:
         "cohort: error_vs_runtime"
     script:
         "../scripts/stage.py"
+
+
+def stability_mesh():
+    """The mesh of the scan that the key `stability_scan` names; none without it."""
+    if CONFIG.stability_scan is None:
+        return {}
+    return {"stability_scan_mesh": [named("stability_scan_mesh", "stability")]}
+
+
+# The scan's breast on meshes of all sizes.
+rule stability_scan_mesh:
+    input:
+        scan=CONFIG.stability_scan or [],
+    output:
+        named("stability_scan_mesh", "stability"),
+    log:
+        log_of("stability_scan_mesh"),
+    benchmark:
+        benchmark_of("stability_scan_mesh")
+    resources:
+        mem_mb=lambda wildcards, input, attempt: max(
+            1500, 400 + 12 * int(input.size_mb)
+        )
+        * attempt,
+        runtime=10,
+    params:
+        settings=settings_of("stability_scan_mesh"),
+        code=stage_digest("stability_scan_mesh"),
+        subject=subject_of,
+    message:
+        "stability: scan"
+    script:
+        "../scripts/stage.py"
+
+
+# Some of the study's scenarios.
+rule stability_batch:
+    input:
+        **stability_mesh(),
+    output:
+        named("stability_batch", "stability", ".{batch}.h5"),
+    log:
+        named("stability_batch", "logs", ".{batch}.log"),
+    benchmark:
+        named("stability_batch", "benchmarks", ".{batch}.tsv")
+    resources:
+        mem_mb=lambda wildcards, attempt: 1500 * attempt,
+        runtime=120,
+    params:
+        settings=settings_of("stability_batch"),
+        code=stage_digest("stability_batch"),
+        subject=lambda wildcards: {"case": "cohort", "row": {"batch": wildcards.batch}},
+    message:
+        "stability: batch {wildcards.batch}"
+    script:
+        "../scripts/stage.py"
+
+
+# Table, page and picture of the solver's stability; `snakemake stability` asks for it.
+rule stability:
+    input:
+        stability_batch=expand(
+            named("stability_batch", "stability", ".{batch}.h5"),
+            batch=range(CONFIG.stability_batch.batches),
+        ),
+    output:
+        named("stability"),
+        str(RESULTS / "tables" / "stability.csv"),
+    log:
+        log_of("stability"),
+    benchmark:
+        benchmark_of("stability")
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        settings=settings_of("stability"),
+        code=stage_digest("stability"),
+        subject=subject_of,
+    message:
+        "stability: table and picture"
+    script:
+        "../scripts/stage.py"
