@@ -78,7 +78,7 @@ class Membrane:
             density = density + share * self.law.energy_kpa(full_invariant(stretch).value)
         return float((density * self.area).sum()) * self.thickness_mm * 1e-3
 
-    def renewed(self, positions: Array) -> "Membrane":  # noqa: ARG002
+    def renewed(self, _positions: Array) -> "Membrane":
         """Itself: it remembers nothing."""
         return self
 

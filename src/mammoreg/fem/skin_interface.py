@@ -22,7 +22,7 @@ from mammoreg.fem.system import node_dofs
 ONSET_MM = 0.05
 """Half the depth over which the barrier's stiffness grows to its whole value."""
 CLING_SHARE = 1e-3
-TOUCH_MM = 0.1
+TOUCH_MM = 0.5
 """Skin nearer than this to the tissue touches it, and sticks where it adheres."""
 
 
