@@ -8,7 +8,11 @@ from numpy.typing import NDArray
 from mammoreg.fem.hexahedra import VTK_IN_SKFEM, hexahedra, jacobians, skfem_basis
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.prescribed import solve_prescribed
-from mammoreg.materials.elastic import neo_hookean
+from mammoreg.materials.catalogue import CATALOGUE, SKIN
+from mammoreg.materials.elastic import ElasticMaterial, hyperelastic, neo_hookean
+from mammoreg.materials.fibres import Fibres
+from mammoreg.materials.laws import Exponential, Linear, NeoHookean, Tabulated
+from mammoreg.materials.mixture import TissueMixture
 from tests.unit.fe_bodies import block, distorted, rotation
 
 Floats = NDArray[np.float64]
@@ -31,12 +35,34 @@ def internal_force(model: HyperelasticModel, positions: Floats, pressure: Floats
     return assembled(model, model.residual(model.state(positions), pressure).force)
 
 
-@pytest.fixture(params=[None, 12.0], ids=["isotropic", "fibres"])
+def mixed() -> TissueMixture:
+    """Three tissues, pure and mixed, over the eight elements of a block of two a side."""
+    gland = np.array([0.0, 1.0, 0.5, 0.0, 0.2, 0.0, 0.9, 0.4])
+    skin = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.3, 0.1, 0.6])
+    laws = (Exponential(4.46, 7.4), Exponential(20.65, 6.09), Linear(10.0))
+    return TissueMixture(laws, np.stack([1.0 - gland - skin, gland, skin], axis=1))
+
+
+MATERIALS: dict[str, ElasticMaterial] = {
+    "neo-hookean": neo_hookean(np.linspace(5.0, 20.0, 8), 0.49),
+    "fibres": neo_hookean(np.linspace(5.0, 20.0, 8), 0.49, FIBRE, 12.0),
+    "stiffening fibres": neo_hookean(np.linspace(5.0, 20.0, 8), 0.49, FIBRE, np.linspace(2.0, 12.0, 8), 1.5),
+    "mixture": hyperelastic(mixed(), 0.49),
+    "mixture with fibres": hyperelastic(mixed(), 0.49, fibres=Fibres(FIBRE, 12.0, 0.7)),
+    "table": hyperelastic(Tabulated((0.1, 0.2, 0.3, 0.4, 0.5), (1.0, 2.5, 4.5, 7.5, 12.0)), 0.49),
+    "skin": hyperelastic(SKIN.law, 0.49),
+} | {
+    f"{name} {tissue}": hyperelastic(getattr(entry, tissue).law, 0.49)
+    for name, entry in CATALOGUE.items()
+    for tissue in ("fat", "gland")
+    if name not in ("lorenzen", "homogeneous")
+}
+
+
+@pytest.fixture(params=list(MATERIALS.values()), ids=list(MATERIALS))
 def model(request: pytest.FixtureRequest) -> HyperelasticModel:
     mesh = distorted(2)
-    mu = np.linspace(5.0, 20.0, 8)
-    material = neo_hookean(mu, 0.49, FIBRE if request.param else None, request.param)
-    return HyperelasticModel(mesh.points, mesh.hexes(), material)
+    return HyperelasticModel(mesh.points, mesh.hexes(), request.param)
 
 
 def test_force_is_the_derivative_of_the_energy(model: HyperelasticModel) -> None:
@@ -82,6 +108,76 @@ def test_forces_turn_with_the_body(model: HyperelasticModel) -> None:
     pressure = np.full(8, -3.0)
     turned = internal_force(model, positions @ turn.T, pressure).reshape(-1, 3)
     np.testing.assert_allclose(turned, internal_force(model, positions, pressure).reshape(-1, 3) @ turn.T, atol=1e-7)
+
+
+def test_no_energy_is_gained_on_a_closed_path(model: HyperelasticModel) -> None:
+    """Work of the internal forces around a loop of deformations, by the trapezoidal rule, which is exact to O(h^2)."""
+    base, pressure = model.points, np.zeros(8)
+    rng = np.random.default_rng(7)
+    first, second = (0.25 * base @ rng.standard_normal((3, 3)) for _ in range(2))
+    work, size, before = 0.0, 0.0, None
+    for angle in np.linspace(0.0, 2.0 * np.pi, 201):
+        place = base + (1.0 - np.cos(angle)) * first + np.sin(angle) * second
+        force = internal_force(model, place, pressure)
+        if before is not None:
+            amount = 0.5 * float((force + before[1]) @ (place - before[0]).ravel())
+            work, size = work + amount, size + abs(amount)
+        before = (place, force)
+    assert abs(work) < 2e-3 * size
+
+
+@pytest.mark.parametrize("name", [name for name, material in MATERIALS.items() if material.fibres is None])
+def test_laws_agree_with_the_closed_form_under_uniaxial_compression(name: str) -> None:
+    """Volume kept: the stress along the axis less that across it is 2 W' (l^2 - 1/l)."""
+    mesh, stretch = distorted(2), 0.6
+    model = HyperelasticModel(mesh.points, mesh.hexes(), MATERIALS[name])
+    state = model.state(model.points * np.array([stretch**-0.5, stretch**-0.5, stretch]))
+    law = model.material.law
+    i1 = np.full(state.det.shape, stretch**2 + 2.0 / stretch)
+    slope = 0.5 * model.material.mu_kpa[:, None] if law is None else law.slope_kpa(i1)
+    expected = np.broadcast_to(2.0 * slope * (stretch**2 - 1.0 / stretch), state.det.shape)
+    np.testing.assert_allclose(state.deviator[..., 2] - state.deviator[..., 0], expected, rtol=1e-9)
+
+
+def test_neo_hookean_body_computes_no_curvature_and_a_body_without_fibres_none_of_theirs() -> None:
+    mesh = distorted(2)
+    terms = {name: HyperelasticModel(mesh.points, mesh.hexes(), material) for name, material in MATERIALS.items()}
+    bends = {name: len(body.state(body.points).runs[0].bends) for name, body in terms.items()}
+    assert [bends[name] for name in ("neo-hookean", "fibres", "mixture", "mixture with fibres")] == [0, 1, 1, 2]
+    assert terms["neo-hookean"].state(mesh.points).runs[0].fibre is None
+    assert bends["samani gland"] == 0
+
+
+def test_runs_of_elements_do_not_show() -> None:
+    """More elements than a run holds: each is as if it were alone."""
+    mesh = distorted(5, seed=8)
+    mu = np.linspace(5.0, 20.0, 125)
+    shares = np.linspace(0.0, 1.0, 125)
+    law = TissueMixture((NeoHookean(4.0), Exponential(20.65, 6.09)), np.stack([shares, 1.0 - shares], axis=1))
+    for material in (neo_hookean(mu, 0.49, FIBRE, mu), hyperelastic(law, 0.49)):
+        model = HyperelasticModel(mesh.points, mesh.hexes(), material)
+        positions, pressure = deformed(model), np.linspace(-9.0, 4.0, 125)
+        state = model.state(positions)
+        internal = model.residual(state, pressure)
+        blocks = model.stiffness(state, pressure, internal.coupling)
+        for element in (0, 63, 64, 124):
+            part = slice(element, element + 1)
+            alone = HyperelasticModel(mesh.points, mesh.hexes()[part], model.material.part(part))
+            own = alone.state(positions)
+            force = alone.residual(own, pressure[part])
+            np.testing.assert_allclose(force.force[0], internal.force[element], atol=1e-9)
+            block_alone = alone.stiffness(own, pressure[part], force.coupling)[0]
+            np.testing.assert_allclose(block_alone, blocks[element], atol=1e-9 * np.abs(blocks).max())
+
+
+def test_volumetric_energy_is_that_of_the_pressures() -> None:
+    mesh = block(2, (10.0, 10.0, 10.0))
+    model = HyperelasticModel(mesh.points, mesh.hexes(), neo_hookean(10.0, 0.49))
+    change = 0.02
+    pressure = np.full(8, change * model.material.bulk_kpa[0])
+    expected_mj = 0.5 * model.material.bulk_kpa[0] * change**2 * 1000.0 * 1e-3
+    assert model.volumetric_energy_mj(pressure) == pytest.approx(expected_mj)
+    assert np.abs(model.residual(model.state(mesh.points * (1.0 + change) ** (1 / 3)), pressure).volume).max() < 1e-9
 
 
 def test_fibres_carry_tension_only() -> None:

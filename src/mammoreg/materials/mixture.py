@@ -27,7 +27,7 @@ class TissueMixture:
     def __post_init__(self) -> None:
         if self.shares.ndim != 2 or self.shares.shape[1] != len(self.laws):
             raise ValueError(f"{len(self.laws)} tissues need shares (E, {len(self.laws)}), not {self.shares.shape}")
-        wrong = np.flatnonzero((self.shares < 0.0).any(axis=1) | ~np.isclose(self.shares.sum(axis=1), 1.0))
+        wrong = np.flatnonzero((self.shares < -1e-9).any(axis=1) | ~np.isclose(self.shares.sum(axis=1), 1.0))
         if wrong.size:
             raise ValueError(f"element {wrong[0]}: shares of tissue must not be negative and add up to 1")
 
