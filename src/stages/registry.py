@@ -13,6 +13,7 @@ COHORT_STAGES = ("calibrate", "tables", "report")
 STUDIES = {
     "runtime": "case",
     "error_vs_runtime": "cohort",
+    "table_1": "cohort",
     **dict.fromkeys(("stability_scan_mesh", "stability_batch", "stability"), "cohort"),
 }
 STAGE_MODULES = {name: f"stages.{name}" for name in ("digital", *CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES)} | {
