@@ -8,7 +8,8 @@ Newton's method does not chatter between sticking and slipping. Terms are per fa
 
 What the barrier's finite stiffness lets through is taken back by augmentation: each point's distance is shifted so
 that the plate presses as hard with the point on its face (a multiplier, written as a shift). Sticking is friction
-without a limit: a point that presses stays where it first pressed, its traction being augmented likewise.
+without a limit: springs draw a point that presses back to where it first did. They are not augmented, for a face's
+points have first pressed one after the other and its corners cannot bring all of them back at once.
 """
 
 from collections.abc import Sequence
@@ -33,7 +34,7 @@ class SoftMemory:
 
     Attributes:
         anchor: places relative to the plates (plates, F, q, 3), mm; empty without friction.
-        traction: friction (plates, F, q, 3), kPa; empty without friction.
+        traction: friction (plates, F, q, 3), kPa, zero where it sticks without limit; empty without friction.
         pressure: normal pressure (plates, F, q), kPa; empty without friction.
         shift: added to the distances (plates, F, q), mm; empty without augmentation.
     """
@@ -113,7 +114,7 @@ class SoftContact:
         if self.sticks:
             pressing = terms.pressure > 0.0
             anchor = np.where((pressing & (before.pressure > 0.0))[..., None], before.anchor, anchor)
-            traction = np.where(pressing[..., None], traction, 0.0)
+            traction = np.zeros_like(anchor)
         return SoftMemory(anchor, traction, terms.pressure, before.shift)
 
     def augmented(self, nodes: Array, plates: Sequence[Plate], height: float, memory: SoftMemory) -> SoftMemory:

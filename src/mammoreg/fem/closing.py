@@ -1,100 +1,47 @@
-"""Plates that close on a patient's breast: load steps of damped equilibria, then rest until nothing moves."""
+"""Plates that close on a patient's breast, to a gap or to a force: load steps of damped equilibria, then rest."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, plate_pair, touching
-from mammoreg.contact.surface import ContactSurface, Rule
+from mammoreg.contact.surface import ContactSurface
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
+from mammoreg.fem.closed import Closed
+from mammoreg.fem.closing_options import COARSE, ClosingOptions
 from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.parts import Part, all_nodes
 from mammoreg.fem.predictor import affine_predictor
+from mammoreg.fem.resting import STIFF_DAMPING, Resting
 from mammoreg.fem.sparse import Array
 
+__all__ = ["COARSE", "Closed", "Closing", "ClosingOptions", "Moving"]
+
+Moving = Literal["both", "upper", "lower"]
+
 LEAST_GUESS_DET = 0.2  # an affine guess that squeezes an element further is not used
-STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
-REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
-HARDER = 10.0  # a step that fails is tried again with this much more damping
-PATIENCE = 4  # a breast that does not rest yet gets so many times the steps
-RESTLESS_MM = 1.0  # a breast that still moves further in its last step has not come to rest
-LARGEST_UNBALANCE = 0.02  # of unbalanced to internal forces at rest, without damping
-LARGEST_PENETRATION = 0.2  # of the plates' gap
+LARGEST_STEP = 0.5  # of the way, after easy steps
+NOMINAL, DEEPEST = 0.5, 0.85  # compression that the load steps of a closing to a force share, and the last one tried
+LOADED = 0.2  # compression at which gradual loads are wholly on in a closing to a force
+FORCE_TOLERANCE = 0.005
+FORCE_ROUNDS = 10
+LARGEST_CORRECTION = 0.2  # of the gap, in the search for a force
 
 
 @dataclass(frozen=True)
-class ClosingOptions:
-    """Numerical settings.
+class Way:
+    """How far plates have come: the state there, their gap, load steps taken and failed."""
 
-    Attributes:
-        steps: load steps at least; more where a step fails.
-        least_step: smallest share of the way before giving up.
-        tolerance_mm: Newton iterations end below this; the breast rests when it moves less.
-        damping: factor of the damping in load steps.
-        rests: steps at rest at most.
-        penalty_per_mm: stiffness of the contact in units of the mean shear modulus while the plates close.
-        stiffening: factors of that stiffness, one after the other, once the plates have closed.
-        band_mm: height of the contact's smooth onset.
-        slip_mm: displacement at which friction reaches its limit.
-        rule: contact points of a face.
-    """
-
-    steps: int = 8
-    least_step: float = 1.0 / 256.0
-    tolerance_mm: float = 0.05
-    damping: float = 0.5
-    rests: int = 12
-    penalty_per_mm: float = 2.0
-    band_mm: float = 1.0
-    slip_mm: float = 2.5
-    rule: Rule = "simpson"
-    stiffening: tuple[float, ...] = (3.0, 10.0)
-
-
-COARSE = ClosingOptions(steps=5, tolerance_mm=0.5, damping=1.0, rests=7, band_mm=2.0)
-"""For the search of a pose: answers to some tenths of a millimetre."""
-
-
-@dataclass(frozen=True)
-class Closed:
-    """A breast at rest between plates, plate frame.
-
-    Attributes:
-        deformed: nodes (N, 3), mm.
-        height_mm: height of the lower plate's face.
-        gap_mm: distance of the plates' faces.
-        force_n: size of the lower and the upper plate's force along the compression.
-        iterations, steps, cuts: Newton iterations, load steps, and steps that had to be cut.
-        residuals: ratio of unbalanced to internal forces of every iteration.
-        restless_mm: displacement of the last step at rest.
-        min_det_f: smallest det F at a Gauss point.
-        volume_change: relative change of the whole volume.
-        penetration_mm: deepest contact point inside a plate.
-        energy_mj: isochoric strain energy.
-        state: to go on from.
-        extra: extra nodes (M, 3), mm, or None.
-    """
-
-    deformed: Array
-    height_mm: float
-    gap_mm: float
-    force_n: tuple[float, float]
-    iterations: int
-    steps: int
-    cuts: int
-    residuals: list[float]
-    restless_mm: float
-    min_det_f: float
-    volume_change: float
-    penetration_mm: float
-    energy_mj: float
     state: DampedState
-    extra: Array | None = None
+    gap_mm: float
+    steps: int = 0
+    cuts: int = 0
 
 
 class Closing:
@@ -106,13 +53,17 @@ class Closing:
         back: condition of the back.
         edge_p_mm: posterior coordinate where the plates end; None: plates without end.
         lip_radius_mm: radius of their lips there.
-        friction: Coulomb coefficient between skin and plates.
+        friction: Coulomb coefficient between skin and plates; infinite: skin that touches sticks.
         options: numerical settings.
         lower_mm: height of the lower plate's face in the end, where it is known; else the plates' common height
             floats, so that the back carries no net force along the compression.
         parts: what acts beside elements, back and plates.
         extra_nodes: undeformed nodes (M, 3) beside the body's, mm, numbered behind them; `skin_quads`, `back` and
             `parts` may name them.
+        moving: which plates move; one that does not stays where it first touches.
+
+    Raises:
+        ValueError: one plate moves, but `lower_mm` says where both end.
     """
 
     def __init__(
@@ -127,9 +78,12 @@ class Closing:
         lower_mm: float | None = None,
         parts: Sequence[Part] = (),
         extra_nodes: Array | None = None,
+        moving: Moving = "both",
     ) -> None:
+        if moving != "both" and lower_mm is not None:
+            raise ValueError("lower_mm says where both plates end; then moving must be 'both'")
         self.model, self.back, self.edge, self.lip = model, back, edge_p_mm, lip_radius_mm
-        self.lower_mm, self.parts, self.extra_nodes = lower_mm, tuple(parts), extra_nodes
+        self.lower_mm, self.parts, self.extra_nodes, self.moving = lower_mm, tuple(parts), extra_nodes, moving
         self.points = all_nodes(model.points, extra_nodes)
         self.options = options if options is not None else ClosingOptions()
         mu = float(np.average(model.material.mu_kpa, weights=model.volume))
@@ -149,6 +103,10 @@ class Closing:
         middle = 0.5 * (self.low + self.high)
         if self.lower_mm is not None:
             middle += share * (self.lower_mm + 0.5 * gap_mm - middle)
+        elif self.moving == "upper":
+            middle = self.low + 0.5 * gap_mm
+        elif self.moving == "lower":
+            middle = self.high - 0.5 * gap_mm
         return plate_pair(gap_mm, middle, self.edge, self.lip)
 
     def equilibrium(self, outline: Part | None = None) -> DampedEquilibrium:
@@ -156,8 +114,9 @@ class Closing:
 
         An outline draws towards or away from the source too; the plates, whose height the image knows, stay then.
         """
-        floats = self.back.holds_height and self.lower_mm is None and outline is None
+        known = self.lower_mm is not None or self.moving != "both" or outline is not None
         parts = self.parts if outline is None else (*self.parts, outline)
+        floats = self.back.holds_height and not known
         return DampedEquilibrium(
             self.model, self.back, self.contact, free_height=floats, parts=parts, extra_nodes=self.extra_nodes
         )
@@ -173,25 +132,31 @@ class Closing:
                 f"the plates' gap of {gap_mm:.1f} mm does not compress a breast of {self.uncompressed_mm:.1f} mm"
             )
         equilibrium = self.equilibrium()
-        points = self.points
-        memory = self.contact.start(points, self.plates(self.uncompressed_mm, 0.0), 0.0)
-        state = DampedState(points, np.zeros(len(self.model.hexes)), 0.0, memory)
-        done, last, taken, cuts = 0.0, self.uncompressed_mm, 0, 0
-        step = 1.0 / self.options.steps
-        while done < 1.0:
-            share = min(1.0, done + step)
-            share = 1.0 if share > 1.0 - 1e-9 else share
-            gap = self.uncompressed_mm + (gap_mm - self.uncompressed_mm) * share
-            try:
-                state = self._advance(equilibrium, state, last, gap, share)
-            except NotConvergedError as error:
-                cuts, step = cuts + 1, 0.5 * step
-                if step < self.options.least_step:
-                    raise NotConvergedError(f"{error}; the plates came to {last:.1f} of {gap_mm:.1f} mm") from error
-                continue
-            done, last, taken = share, gap, taken + 1
-            step = min(1.5 * step, 1.0 / self.options.steps)
-        return self._settled(equilibrium, state, gap_mm, taken, cuts, self.options.damping)
+        way = self._march(equilibrium, gap_mm, 1.0 / self.options.steps)[-1]
+        return self._resting(equilibrium, gap_mm, way).settled(way.state, self.options.damping)
+
+    def close_to_force(self, force_n: float) -> Closed:
+        """Close the plates until the mean of their forces is `force_n`, within half a percent; `gap_mm` says where.
+
+        Raises:
+            ValueError: the force is not positive.
+            NotConvergedError: the force is not reached, or as `close`.
+        """
+        if force_n <= 0.0:
+            raise ValueError(f"the plates' force must be positive, not {force_n} N")
+        equilibrium = self.equilibrium()
+        deepest = (1.0 - DEEPEST) * self.uncompressed_mm
+
+        def enough(way: Way) -> bool:
+            return self._force_n(equilibrium, way) >= force_n
+
+        ways = self._march(equilibrium, deepest, NOMINAL / DEEPEST / self.options.steps, LOADED / DEEPEST, enough)
+        if not enough(ways[-1]):
+            raise NotConvergedError(
+                f"a force of {force_n:.1f} N is not reached: at a gap of {deepest:.1f} mm the plates press with "
+                f"{self._force_n(equilibrium, ways[-1]):.1f} N"
+            )
+        return self._sought(equilibrium, ways, force_n)
 
     def resume(self, state: DampedState, gap_mm: float) -> Closed:
         """Come to rest at a gap from a state near the answer, such as that of a coarser mesh.
@@ -199,10 +164,9 @@ class Closing:
         Raises:
             NotConvergedError: with the reason.
         """
-        stiffest = self.options.stiffening[-1] if self.options.stiffening else 1.0
-        stiff = self.equilibrium().with_contact(self.contact.stiffened(stiffest))
-        eased = self._eased(stiff, state, Load(self.plates(gap_mm)), self.options.damping)
-        return self._rested(stiff, eased, gap_mm, 1, 0, STIFF_DAMPING * self.options.damping)
+        resting = self._resting(self.equilibrium(), gap_mm, Way(state, gap_mm, 1))
+        eased = resting.eased(resting.stiff, state, self.options.damping)
+        return resting.rested(resting.stiff, eased, STIFF_DAMPING * self.options.damping)
 
     def rest(self, closed: Closed, outline: Part, damping: float) -> Closed:
         """Go on from a closed state with an outline drawing on the skin.
@@ -210,105 +174,100 @@ class Closing:
         Raises:
             NotConvergedError: with the reason.
         """
-        equilibrium = self.equilibrium(outline)
         lagged = self.parts if closed.state.parts is None else closed.state.parts[: len(self.parts)]
         state = replace(closed.state, parts=(*lagged, outline))
+        way = Way(state, closed.gap_mm, closed.steps, closed.cuts)
+        resting = self._resting(self.equilibrium(outline), closed.gap_mm, way)
         # Easing the contact first would unload the friction that the closing has built up.
-        stiffest = self.options.stiffening[-1] if self.options.stiffening else 1.0
-        stiff = equilibrium.with_contact(self.contact.stiffened(stiffest))
         try:
-            return self._rested(stiff, state, closed.gap_mm, closed.steps, closed.cuts, damping)
+            return resting.rested(resting.stiff, state, damping)
         except NotConvergedError:
-            return self._settled(equilibrium, state, closed.gap_mm, closed.steps, closed.cuts, damping)
+            return resting.settled(state, damping)
 
-    def _advance(
-        self, equilibrium: DampedEquilibrium, state: DampedState, last: float, gap: float, share: float
-    ) -> DampedState:
-        load = Load(self.plates(gap, share), share)
-        guess = self.predictor.predict(state.positions, state.height, load.plates, gap / last)
+    def _resting(self, equilibrium: DampedEquilibrium, gap_mm: float, way: Way) -> Resting:
+        return Resting(equilibrium, self.options, Load(self.plates(gap_mm)), gap_mm, way.steps, way.cuts)
+
+    def _march(
+        self,
+        equilibrium: DampedEquilibrium,
+        gap_mm: float,
+        first: float,
+        loaded: float = 1.0,
+        enough: Callable[[Way], bool] = lambda _: False,
+    ) -> list[Way]:
+        """Load steps from first touch to a gap, or until it is enough.
+
+        Args:
+            equilibrium: the equations.
+            gap_mm: end of the way.
+            first: share of the way in a step; less where one fails, more after easy ones.
+            loaded: share of the way at which gradual loads are wholly on.
+            enough: whether to stop.
+
+        Raises:
+            NotConvergedError: with the reason and how far the plates came.
+        """
+        start = self.contact.start(self.points, self.plates(self.uncompressed_mm, 0.0), 0.0)
+        state = DampedState(self.points, np.zeros(len(self.model.hexes)), 0.0, start)
+        ways, done, step, cuts = [Way(state, self.uncompressed_mm)], 0.0, first, 0
+        while done < 1.0 and not enough(ways[-1]):
+            share = min(1.0, done + step)
+            share = 1.0 if share > 1.0 - 1e-9 else share
+            gap = self.uncompressed_mm + (gap_mm - self.uncompressed_mm) * share
+            before = len(equilibrium.residuals)
+            try:
+                state = self._advance(equilibrium, ways[-1], gap, min(1.0, share / loaded))
+            except NotConvergedError as error:
+                cuts, step = cuts + 1, 0.5 * step
+                if step < self.options.least_step:
+                    came = f"the plates came to {ways[-1].gap_mm:.1f} of {gap_mm:.1f} mm"
+                    raise NotConvergedError(f"{error}; {came}") from error
+                continue
+            done = share
+            ways.append(Way(state, gap, ways[-1].steps + 1, cuts))
+            easy = len(equilibrium.residuals) - before <= self.options.easy_iterations
+            step = min(2.0 * step, LARGEST_STEP) if easy else min(1.5 * step, max(step, first))
+        return ways
+
+    def _advance(self, equilibrium: DampedEquilibrium, way: Way, gap: float, share: float) -> DampedState:
+        load, state = Load(self.plates(gap, share), share), way.state
+        guess = self.predictor.predict(state.positions, state.height, load.plates, gap / way.gap_mm)
         if self.model.determinants(guess).min() < LEAST_GUESS_DET:
             guess = state.positions
         start = replace(state, positions=np.where(equilibrium.held, equilibrium.anchors(share), guess))
         return equilibrium.step(start, load, self.options.damping, self.options.tolerance_mm)
 
-    def _settled(
-        self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
-    ) -> Closed:
-        """Rest in the stiffened contact or, where that is not found, in the soft one."""
-        load, stiff, eased = Load(self.plates(gap_mm)), equilibrium, state
-        try:
-            for factor in self.options.stiffening:
-                eased = self._eased(stiff, eased, load, damping)
-                stiff = equilibrium.with_contact(self.contact.stiffened(factor))
-            return self._rested(stiff, eased, gap_mm, taken, cuts, STIFF_DAMPING * damping)
-        except NotConvergedError:
-            if not self.options.stiffening:
-                raise
-        return self._rested(equilibrium, state, gap_mm, taken, cuts + 1, damping)
+    def _force_n(self, equilibrium: DampedEquilibrium, way: Way) -> float:
+        """Mean size of the plates' forces along the compression."""
+        forces = equilibrium.terms(way.state, self.plates(way.gap_mm)).plate_force
+        return 1e-3 * float(np.abs(forces[:, 2]).mean())
 
-    def _eased(self, contact: DampedEquilibrium, state: DampedState, load: Load, damping: float) -> DampedState:
-        """One step in a contact, damped harder where it fails."""
-        for factor in (damping, HARDER * damping):
-            try:
-                return contact.step(state, load, factor, self.options.tolerance_mm)
-            except NotConvergedError:
-                continue
-        return contact.step(state, load, HARDER**2 * damping, self.options.tolerance_mm)
+    def _sought(self, equilibrium: DampedEquilibrium, ways: list[Way], force_n: float) -> Closed:
+        """Rest at the gap whose force is wanted: a secant on its logarithm from the last two load steps on."""
+        loads = [np.log(max(self._force_n(equilibrium, way), 1e-3 * force_n)) for way in ways[-2:]]
+        rate = (loads[1] - loads[0]) / (ways[-1].gap_mm - ways[-2].gap_mm)
+        way, wanted, closed = ways[-2], float(np.log(force_n)), None
+        gap = float(np.clip(way.gap_mm + (wanted - loads[0]) / rate, ways[-1].gap_mm, way.gap_mm))
+        for _ in range(FORCE_ROUNDS):
+            before, last = closed, way.gap_mm
+            closed = self._closed_further(equilibrium, way, gap, soft=closed is None)
+            load = _log_force(closed)
+            if abs(np.expm1(load - wanted)) < FORCE_TOLERANCE:
+                return closed
+            if before is not None and gap != last:
+                rate = (load - _log_force(before)) / (gap - last)
+            way = Way(closed.state, gap, closed.steps, closed.cuts)
+            gap += float(np.clip((wanted - load) / rate, -LARGEST_CORRECTION * gap, LARGEST_CORRECTION * gap))
+        raise NotConvergedError(f"no gap found at which the plates press with {force_n:.1f} N; last {gap:.1f} mm")
 
-    def _rested(
-        self, equilibrium: DampedEquilibrium, state: DampedState, gap_mm: float, taken: int, cuts: int, damping: float
-    ) -> Closed:
-        load = Load(self.plates(gap_mm))
-        tolerance, moved, factor = self.options.tolerance_mm, np.inf, damping
-        for rest in range(PATIENCE * self.options.rests):
-            if rest >= self.options.rests and moved <= RESTLESS_MM:
-                break
-            try:
-                after, reason = equilibrium.approach(state, load, factor, tolerance)
-            except NotConvergedError:
-                cuts, factor = cuts + 1, HARDER * factor
-                continue
-            moved = np.inf if reason else float(np.abs(after.positions - state.positions).max())
-            state, factor = after, factor if reason else 0.25 * factor
-            if moved < 2.0 * tolerance and factor < REST_SHARE * damping:
-                break
-        if not np.isfinite(moved) or moved > RESTLESS_MM:
-            raise NotConvergedError(f"the breast does not come to rest between the plates (last moved {moved:.1f} mm)")
-        return self._closed(equilibrium, state, load, gap_mm, taken, cuts, moved)
+    def _closed_further(self, equilibrium: DampedEquilibrium, way: Way, gap: float, *, soft: bool) -> Closed:
+        """Rest at a gap from one near it: of a load step in the soft contact, or of a body at rest."""
+        resting = self._resting(equilibrium, gap, way)
+        if soft:
+            return resting.settled(self._advance(equilibrium, way, gap, 1.0), self.options.damping)
+        stiff = self._advance(resting.stiff, way, gap, 1.0)
+        return resting.rested(resting.stiff, stiff, STIFF_DAMPING * self.options.damping)
 
-    def _closed(
-        self,
-        equilibrium: DampedEquilibrium,
-        state: DampedState,
-        load: Load,
-        gap_mm: float,
-        taken: int,
-        cuts: int,
-        moved: float,
-    ) -> Closed:
-        terms, unbalance = equilibrium.terms(state, load.plates), equilibrium.unbalance(state, load)
-        if unbalance > LARGEST_UNBALANCE:
-            raise NotConvergedError(f"forces at rest are out of balance by {unbalance:.1%}")
-        if terms.penetration_mm > LARGEST_PENETRATION * gap_mm:
-            raise NotConvergedError(
-                f"the skin passes the plates by {terms.penetration_mm:.1f} mm at a gap of {gap_mm:.1f} mm"
-            )
-        count = len(self.model.points)
-        forces = np.abs(terms.plate_force[:, 2]) * 1e-3
-        return Closed(
-            deformed=state.positions[:count],
-            height_mm=load.plates[0].height_mm + state.height,
-            gap_mm=gap_mm,
-            force_n=(float(forces[0]), float(forces[1])),
-            iterations=len(equilibrium.residuals),
-            steps=taken,
-            cuts=cuts,
-            residuals=equilibrium.residuals,
-            restless_mm=moved,
-            min_det_f=float(self.model.determinants(state.positions).min()),
-            volume_change=self.model.volume_change(state.positions),
-            penetration_mm=terms.penetration_mm,
-            energy_mj=self.model.energy_mj(state.positions),
-            state=state,
-            extra=None if self.extra_nodes is None else state.positions[count:],
-        )
+
+def _log_force(closed: Closed) -> float:
+    return float(np.log(0.5 * sum(closed.force_n)))

@@ -19,6 +19,7 @@ from mammoreg.fem.boundary import BackCondition
 from mammoreg.fem.damped_step import DampedStep
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.parts import Part, Parts, all_nodes, back_springs, parts_at
+from mammoreg.fem.report import Stopwatch
 from mammoreg.fem.sparse import Array, Integers
 from mammoreg.fem.system import NewtonSystem, node_dofs
 
@@ -65,6 +66,7 @@ class DampedEquilibrium:
         points: all undeformed nodes.
         held: their prescribed components.
         residuals: residual ratio of each Newton iteration so far.
+        watch: where the time goes.
     """
 
     def __init__(
@@ -86,6 +88,7 @@ class DampedEquilibrium:
         self.free: Integers = np.flatnonzero(np.append(~self.held.ravel(), free_height))
         self.weight = self._weight()
         self.residuals: list[float] = []
+        self.watch = Stopwatch()
         self._prepare(self.parts)
 
     def with_contact(self, contact: SoftContact) -> "DampedEquilibrium":

@@ -57,7 +57,7 @@ class DampedStep:
         self, equilibrium: "DampedEquilibrium", start: "DampedState", load: "Load", acting: Parts, damping: float
     ) -> None:
         self.equilibrium, self.start, self.load, self.acting, self.damping = equilibrium, start, load, acting, damping
-        self.model, self.system = equilibrium.model, equilibrium.system
+        self.model, self.system, self.watch = equilibrium.model, equilibrium.system, equilibrium.watch
         self.shift = 0.0
 
     def solve(self, tolerance_mm: float) -> tuple["DampedState", str]:
@@ -96,13 +96,14 @@ class DampedStep:
         return share if np.isinf(last) or share == 1.0 else 0.0
 
     def _balance(self, state: "DampedState") -> Balance:
-        elements = self.model.state(state.positions)
-        internal = self.model.residual(elements, state.pressure)
-        contact = self.equilibrium.terms(state, self.load.plates)
-        weight = self.damping * self.equilibrium.weight
-        pairs = [part.terms(state.positions) for part in self.acting]
-        count = len(self.equilibrium.springs)
-        tangent = self.model.stiffness(elements, state.pressure, internal.coupling)
+        with self.watch.timing("contact"):
+            contact = self.equilibrium.terms(state, self.load.plates)
+        with self.watch.timing("assembly"):
+            elements = self.model.state(state.positions)
+            internal = self.model.residual(elements, state.pressure)
+            tangent = self.model.stiffness(elements, state.pressure, internal.coupling)
+            pairs = [part.terms(state.positions) for part in self.acting]
+        weight, count = self.damping * self.equilibrium.weight, len(self.equilibrium.springs)
         damped = (weight * self._way(state))[:, None], weight[:, None, None]
         groups = [(internal.force, tangent), *pairs[:count], (contact.force, contact.stiffness), damped, *pairs[count:]]
         return Balance(internal, [vector for vector, _ in groups], [block for _, block in groups])
@@ -121,7 +122,8 @@ class DampedStep:
         merit = self._merit(state.positions, state.height, state.pressure)
         for _ in range(SHIFTS):
             slope = float(gradient @ update)
-            share = self._descending(state, update, slope, merit) if slope < 0.0 else 0.0
+            with self.watch.timing("search"):
+                share = self._descending(state, update, slope, merit) if slope < 0.0 else 0.0
             if share > 0.0:
                 self._adapt(share)
                 return _moved(state, share, update, pressure)
@@ -142,7 +144,8 @@ class DampedStep:
         if self.shift > 0.0:
             place = len(self.equilibrium.springs) + 2
             blocks[place] = blocks[place] + self.shift * self.equilibrium.weight[:, None, None]
-        return self.system.increment(balance.internal, balance.vectors, blocks)
+        with self.watch.timing("linear"):
+            return self.system.increment(balance.internal, balance.vectors, blocks)
 
     def _descending(self, state: "DampedState", update: Array, slope: float, merit: float) -> float:
         """Share of an update at which the merit has lessened; 0: there is none."""
