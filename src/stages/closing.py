@@ -1,9 +1,10 @@
 """The closing plates of stage `compress` as an object, built anew from artefacts by the stages that go on from it."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.fem.closing import Closed, Closing, ClosingOptions
@@ -14,7 +15,14 @@ from stages.mechanics import Mechanics, PlacedBreast, place_breast
 from stages.methods import block_mesh
 from stages.tissue_map import kept_gland_share
 
-_MEMORY = {"anchor": "mm", "traction": "kPa", "pressure": "kPa"}
+Floats = NDArray[np.float64]
+_MEMORY = {
+    "anchor": ("mm", "contact points at the last step, each plate"),
+    "traction": ("kPa", "friction, each plate"),
+    "pressure": ("kPa", "contact pressure, each plate"),
+    "shift": ("mm", "shift of contact points' distances, each plate"),
+}
+_MEMBRANE = "membrane"
 
 
 def placed_again(mesh: Artefact, compress: Artefact) -> PlacedBreast:
@@ -35,13 +43,15 @@ def closing_plates(
     """Plates around a placed breast; `lower_mm` is the lower plate's height where a second volume shows it."""
     return Closing(
         breast.model,
-        breast.skin_quads,
+        breast.skin.contact_quads,
         breast.back,
         edge_p_mm if mechanics.plates_end else None,
         mechanics.lip_radius_mm,
         mechanics.friction,
         options,
         lower_mm,
+        breast.skin.parts,
+        breast.skin.extra_nodes,
     )
 
 
@@ -55,14 +65,21 @@ def kept_values(mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, an
     }
 
 
-def kept_arrays(closed: Closed) -> dict[str, Array]:
-    """The state of a breast between plates, from which `resumed` goes on."""
-    memory = closed.state.memory
-    names = {"anchor": "contact points at the last step", "traction": "friction", "pressure": "contact pressure"}
-    return {
-        "pressure": Array(closed.state.pressure, "kPa", "element pressures, positive in tension"),
-        **{f"contact/{n}": Array(getattr(memory, n), _MEMORY[n], f"{text}, each plate") for n, text in names.items()},
-    }
+def kept_arrays(closed: Closed, lift: Floats) -> dict[str, Array]:
+    """The state of a breast between plates, from which `resumed` goes on; `lift` (3,) takes it to the pose's plates."""
+    memory = {f.name: getattr(closed.state.memory, f.name) for f in fields(SoftMemory)}
+    kept = {f"contact/{n}": Array(data, *_MEMORY[n]) for n, data in memory.items() if data.size}
+    kept["pressure"] = Array(closed.state.pressure, "kPa", "element pressures, positive in tension")
+    if closed.extra is not None:
+        kept[_MEMBRANE] = Array(closed.extra + lift, "mm", "nodes of the skin's own membrane, plate frame")
+    return kept
+
+
+def _kept_memory(compress: Artefact) -> SoftMemory:
+    """What contact points remember; an array is empty where the contact does not need it."""
+    names = {name: f"contact/{name}" for name in _MEMORY}
+    kept = {n: compress.array(key, _MEMORY[n][0]) for n, key in names.items() if key in compress.names()}
+    return SoftMemory(**{f.name: kept.get(f.name, np.zeros(0)) for f in fields(SoftMemory)})
 
 
 def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closing, Closed]:
@@ -71,12 +88,10 @@ def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closi
     options = replace(ClosingOptions(), **_options(compress.value("options")))
     breast = placed_again(mesh, compress)
     closing = closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))
-    lift = np.array([0.0, 0.0, compress.value("lift_mm")])
-    memory = SoftMemory(**{name: compress.array(f"contact/{name}", units) for name, units in _MEMORY.items()})
-    positions = compress.array("deformed", "mm") - lift
-    state = DampedState(positions, compress.array("pressure", "kPa"), compress.value("raised_mm"), memory)
+    state = _kept_state(compress, closing)
+    membrane = None if closing.extra_nodes is None else state.positions[-len(closing.extra_nodes) :]
     closed = Closed(
-        deformed=positions,
+        deformed=state.positions[: len(closing.model.points)],
         height_mm=compress.value("height_mm") - compress.value("lift_mm"),
         gap_mm=compress.value("thickness_mm"),
         force_n=(compress.value("force_lower_n"), compress.value("force_upper_n")),
@@ -90,8 +105,22 @@ def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closi
         penetration_mm=compress.value("penetration_mm"),
         energy_mj=compress.value("energy_mj"),
         state=state,
+        extra=membrane,
     )
     return closing, closed
+
+
+def _kept_state(compress: Artefact, closing: Closing) -> DampedState:
+    lift = np.array([0.0, 0.0, compress.value("lift_mm")])
+    nodes = [compress.array(n, "mm") for n in ("deformed", _MEMBRANE) if n in compress.names()]
+    positions = np.concatenate(nodes) - lift
+    return DampedState(
+        positions,
+        compress.array("pressure", "kPa"),
+        compress.value("raised_mm"),
+        _kept_memory(compress),
+        tuple(part.renewed(positions) for part in closing.parts),
+    )
 
 
 def _options(kept: dict[str, Any]) -> dict[str, Any]:

@@ -46,19 +46,18 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options, lower_mm)
     closed = closing.close(view.thickness_mm)
     # The floating breast is placed where the pose has seen the plates.
-    lift_mm = view.height_mm - closed.height_mm
-    deformed = closed.deformed + np.array([0.0, 0.0, lift_mm])
+    lift = np.array([0.0, 0.0, view.height_mm - closed.height_mm])
     return Fields(
         arrays={
-            "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame"),
+            "deformed": Array(closed.deformed + lift, "mm", "mesh nodes between the plates, plate frame"),
             "residuals": Array(np.array(closed.residuals), "1", "unbalanced over internal forces, each iteration"),
-            **kept_arrays(closed),
+            **kept_arrays(closed, lift),
             **gland_share_array(gland),
         },
         values={
             **solve_report(closed),
             "height_mm": view.height_mm,
-            "lift_mm": lift_mm,
+            "lift_mm": float(lift[2]),
             "known_lower_mm": lower_mm,
             "raised_mm": closed.state.height,
             "uncompressed_mm": closing.uncompressed_mm,

@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mammoreg.fem.boundary import BackCondition, back_condition
+from mammoreg.fem.membrane import SKIN_THICKNESS_MM
 from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.skin import SkinModel, SkinName, skin_model
+from mammoreg.fem.skin_law import SKIN_MODULUS_KPA, TensionLinear
 from mammoreg.geometry import breast_to_plate
 from mammoreg.meshing.block import BlockMesh
 from stages.contract import SettingsModel
@@ -45,6 +48,15 @@ class Mechanics(SettingsModel):
         description="stiffness along the nipple axis in tension over the shear modulus (the paper's macroscopic "
         "anisotropy); "
         "1 is an order of magnitude, not a fit, and 0 the paper's isotropic tissue",
+    )
+    skin: SkinName = Field(
+        "none",
+        description="none; attached to the surface's nodes; or an enclosing membrane that is sliding on the breast or "
+        "adherent where it touches (Table IV)",
+    )
+    skin_thickness_mm: float = Field(SKIN_THICKNESS_MM, gt=0.0, le=5.0, description="thickness of skin, mm")
+    skin_modulus_kpa: float = Field(
+        SKIN_MODULUS_KPA, gt=0.0, le=1000.0, description="Young's modulus of skin, kPa (paper: 10 below 50 % strain)"
     )
     friction: float = Field(
         0.46,
@@ -91,13 +103,13 @@ class PlacedBreast:
     Attributes:
         model: elements and material.
         back: condition of its back.
-        skin_quads: faces of its skin.
+        skin: what its skin adds, and the faces that meet the plates.
         stiffening: shear modulus at the compression to come over the initial one.
     """
 
     model: HyperelasticModel
     back: BackCondition
-    skin_quads: NDArray[np.int64]
+    skin: SkinModel
     stiffening: float = 1.0
 
 
@@ -129,7 +141,9 @@ def place_breast(
     model = HyperelasticModel(points, mesh.hexes(), tissue.material)
     shear = tissue.mu_kpa / mechanics.back_layer_mm
     back = back_condition(mechanics.back, points, mesh.back_quads(), shear, along_kpa_per_mm=shear)
-    return PlacedBreast(model, back, mesh.skin_quads(), tissue.stiffening)
+    law = TensionLinear(mechanics.skin_modulus_kpa)
+    skin = skin_model(mechanics.skin, model, mesh.skin_quads(), law, mechanics.skin_thickness_mm)
+    return PlacedBreast(model, back, skin, tissue.stiffening)
 
 
 def _tissue(mechanics: Mechanics, mu_kpa: float, gland: Floats | None, compression: float) -> Tissue:

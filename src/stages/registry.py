@@ -14,6 +14,8 @@ STUDIES = {
     "runtime": "case",
     "error_vs_runtime": "cohort",
     "table_1": "cohort",
+    "volunteer": "case",
+    "paper_tables": "cohort",
     **dict.fromkeys(("stability_scan_mesh", "stability_batch", "stability"), "cohort"),
 }
 STAGE_MODULES = {name: f"stages.{name}" for name in ("digital", *CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES)} | {

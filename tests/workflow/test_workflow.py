@@ -147,6 +147,23 @@ def test_study_is_a_target_of_its_own(finished):
     assert jobs == ["error_vs_runtime", "runtime"]
 
 
+def test_paper_s_tables_are_made_of_the_volunteers_alone(finished):
+    project, cohort, _ = finished
+    assert _jobs(snakemake(project, "-n", "paper_tables", *_keys(cohort)).stdout) == ["paper_tables"]
+    table = cohort / "cases.tsv"
+    text = table.read_text()
+    lines = [line.split("\t") for line in text.splitlines()]
+    extra = [["mr_compressed", "mr_compressed_landmarks"], ["a.nii.gz", "points.tsv"], ["", ""]]
+    table.write_text("".join("\t".join(row + more) + "\n" for row, more in zip(lines, extra, strict=True)))
+    done = snakemake(project, "paper_tables", *_keys(cohort, "with volunteer"))
+    table.write_text(text)
+    assert done.returncode == 0, done.stdout
+    results = project / "with volunteer"
+    assert sorted(path.parent.name for path in results.glob("*/volunteer.h5")) == ["a"]
+    assert (results / "tables" / "table_4_skin.csv").exists()
+    assert not (results / "report.html").exists()
+
+
 def test_volume_of_nan_among_three_ends_its_case_only(tmp_path):
     project = make_project(tmp_path / "project")
     cohort = make_cohort(tmp_path / "data")

@@ -10,6 +10,8 @@ import nibabel
 import numpy as np
 from PIL import Image
 
+from stages.registry import STUDIES
+
 PROJECT = Path(__file__).resolve().parents[2]
 INPUTS = {
     "segment": (("mr",), ("mr_labels", "mr_compressed")),
@@ -30,9 +32,11 @@ INPUTS = {
     "report": (("cases", "tables"), ("views", "figures", "evaluate")),
     "runtime": (("segment", "mesh"), ("pose",)),
     "error_vs_runtime": (("runtime",), ()),
+    "volunteer": (("segment", "mesh", "pose"), ("calibrate", "compress", "solve", "mr_landmarks")),
+    "paper_tables": ((), ("volunteer",)),
     "digital": ((), ()),
 }
-TAKES_FAILED = ("evaluate", "figures", "tables", "report", "error_vs_runtime")
+TAKES_FAILED = ("evaluate", "figures", "tables", "report", "error_vs_runtime", "volunteer", "paper_tables")
 
 TOY_STAGE = '''
 import numpy as np
@@ -57,6 +61,7 @@ def run(inputs, settings, subject):
         "report": {{"report.html": b"report"}},
         "tables": {{name: b"table" for name in ("cohort.nc", *(f"{{t.name}}.csv" for t in TABLES))}},
         "error_vs_runtime": {{"tables/error_vs_runtime.csv": b"table"}},
+        "paper_tables": {{f"tables/table_{{n}}.csv": b"table" for n in ("2_materials", "3_boundary", "4_skin")}},
     }}.get({name!r}, {{}})
     return Fields(arrays={{"level": Array(np.full(3, settings.level), "1", "level")}}, files=files, **status)
 
@@ -75,7 +80,7 @@ def make_project(folder: Path) -> Path:
     (folder / "src/stages/studies").mkdir(exist_ok=True)
     (folder / "src/stages/studies/__init__.py").write_text('"""Studies."""\n')
     for name, (required, optional) in INPUTS.items():
-        module = folder / "src/stages" / ("studies" if name in ("runtime", "error_vs_runtime") else "") / f"{name}.py"
+        module = folder / "src/stages" / ("studies" if name in STUDIES else "") / f"{name}.py"
         shutil.rmtree(module.with_suffix(""), ignore_errors=True)
         module.write_text(
             TOY_STAGE.format(
@@ -83,7 +88,7 @@ def make_project(folder: Path) -> Path:
                 required=required,
                 optional=optional,
                 takes_failed=name in TAKES_FAILED,
-                folder="." if name in ("report", "error_vs_runtime") else None,
+                folder="." if name in ("report", "error_vs_runtime", "paper_tables") else None,
             )
         )
     (folder / "config/config.yaml").write_text("results: results\n")

@@ -169,5 +169,22 @@ def table_files():
     ]
 
 
+def volunteers():
+    """Cases with landmarks in two MR volumes."""
+    known = ("mr_compressed", "mr_landmarks", "mr_compressed_landmarks")
+    return [
+        case
+        for case, row in COHORT.cases.items()
+        if not set(known) - row.files().keys()
+    ]
+
+
+def stability_mesh():
+    """The mesh of the scan that the key `stability_scan` names; none without it."""
+    if CONFIG.stability_scan is None:
+        return {}
+    return {"stability_scan_mesh": [named("stability_scan_mesh", "stability")]}
+
+
 def complete_file():
     return str(RESULTS / "tables" / "complete.txt")

@@ -79,11 +79,57 @@ rule table_1:
         "../scripts/stage.py"
 
 
-def stability_mesh():
-    """The mesh of the scan that the key `stability_scan` names; none without it."""
-    if CONFIG.stability_scan is None:
-        return {}
-    return {"stability_scan_mesh": [named("stability_scan_mesh", "stability")]}
+# A volunteer's landmarks under the paper's materials, boundary conditions and skins.
+rule volunteer:
+    input:
+        unpack(inputs_of("volunteer")),
+    output:
+        named("volunteer"),
+    log:
+        log_of("volunteer"),
+    benchmark:
+        benchmark_of("volunteer")
+    resources:
+        mem_mb=lambda wildcards, input, attempt: max(
+            1200, 400 + 12 * int(input.size_mb)
+        )
+        * attempt,
+        runtime=30,
+    params:
+        settings=settings_of("volunteer"),
+        code=stage_digest("volunteer"),
+        subject=subject_of,
+    message:
+        "{wildcards.case}: volunteer"
+    script:
+        "../scripts/stage.py"
+
+
+# Tables II to IV beside the paper's; `snakemake paper_tables` asks for them.
+rule paper_tables:
+    input:
+        volunteer=[named("volunteer").format(case=case) for case in volunteers()],
+    output:
+        named("paper_tables"),
+        *(
+            str(RESULTS / "tables" / f"table_{name}.csv")
+            for name in ("2_materials", "3_boundary", "4_skin")
+        ),
+    log:
+        log_of("paper_tables"),
+    benchmark:
+        benchmark_of("paper_tables")
+    resources:
+        mem_mb=700,
+        runtime=10,
+    params:
+        settings=settings_of("paper_tables"),
+        code=stage_digest("paper_tables"),
+        subject=subject_of,
+    message:
+        "cohort: paper_tables"
+    script:
+        "../scripts/stage.py"
 
 
 # The scan's breast on meshes of all sizes.

@@ -21,11 +21,11 @@ def coarse_compression(
 
     Args:
         mesh: undeformed, breast frame.
-        mechanics: settings; all tissue is homogeneous here.
+        mechanics: settings; all tissue is homogeneous and without skin here.
         mu_kpa: shear modulus.
         plates_known: the plates stand at the view's height, which a second volume shows.
     """
-    alike = mechanics.model_copy(update={"material": "homogeneous", "gland_contrast": 1.0})
+    alike = mechanics.model_copy(update={"material": "homogeneous", "gland_contrast": 1.0, "skin": "none"})
 
     def compress(view: ViewGeometry) -> Compressed | None:
         breast = place_breast(mesh, view.angle_deg, alike, mu_kpa)

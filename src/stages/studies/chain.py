@@ -41,10 +41,10 @@ def plan_of(inputs: Inputs, subject: Subject, given: Sequence[str], again: Seque
         given: stages whose artefacts are taken from the main run.
         again: stages that run again.
     """
-    artefacts = {name: inputs.artefacts(name) for name in dict.fromkeys((*given, *again, "pose"))}
-    settings = {name: json.loads(found[0].attrs["settings"]) for name, found in artefacts.items() if found}
-    rows = {str(pose.view): json.loads(pose.attrs["row"]) for pose in artefacts["pose"]}
-    paths = {name: [a.path for a in artefacts[name]] for name in given if artefacts[name]}
+    before = {name: inputs.artefacts(name) for name in again}
+    settings = {name: json.loads(found[0].attrs["settings"]) for name, found in before.items() if found}
+    rows = {str(pose.view): json.loads(pose.attrs["row"]) for pose in inputs.artefacts("pose")}
+    paths = {name: [a.path for a in inputs.artefacts(name)] for name in given if inputs.has(name)}
     paths |= {name: [path] for name, path in inputs.files.items()}
     return Plan(subject, paths, settings, dict(sorted(rows.items())))
 

@@ -18,11 +18,12 @@ _STYLE = (
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with a table of texts under it."""
+    """A heading with paragraphs and a table of texts under it."""
 
     heading: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
+    paragraphs: Sequence[str] = ()
 
 
 def cells(table: Table, rows: Iterable[Row]) -> list[list[str]]:
@@ -49,7 +50,7 @@ def as_markdown(title: str, first: Sequence[str], sections: Sequence[Section]) -
     """Readable text: what must be said first, then the sections with aligned columns."""
     lines = [f"# {title}", "", *(f"**{text}**\n" for text in first)]
     for section in sections:
-        lines += [f"## {section.heading}", "", *_aligned(section), ""]
+        lines += [f"## {section.heading}", "", *(f"{text}\n" for text in section.paragraphs), *_aligned(section), ""]
     return "\n".join(lines).encode()
 
 
@@ -59,7 +60,8 @@ def as_html(title: str, first: Sequence[str], sections: Sequence[Section]) -> by
     parts = [head, f"<style>{_STYLE}</style><h1>{html.escape(title)}</h1>"]
     parts += [f"<p class=first>{html.escape(text)}</p>" for text in first]
     for section in sections:
-        parts.append(f"<h2>{html.escape(section.heading)}</h2>{html_table(section)}")
+        paragraphs = "".join(f"<p>{html.escape(text)}</p>" for text in section.paragraphs)
+        parts.append(f"<h2>{html.escape(section.heading)}</h2>{paragraphs}{html_table(section)}")
     return "\n".join([*parts, "</html>", ""]).encode()
 
 

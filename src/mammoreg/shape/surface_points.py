@@ -1,0 +1,51 @@
+"""Ties that draw points of the skin to where they are known to lie (paper, section II-C, Table III, additional points)."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mammoreg.fem.ties import PlaneTies
+from mammoreg.geometry.frames import Points
+from mammoreg.meshing.skin import skin_facets
+
+_FACETS = 8
+
+
+def nearest_on_skin(
+    nodes: Points, faces: NDArray[np.integer], points: Points
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Corners (P, 4) and shares (P, 4) of the skin's points nearest to points (P, 3), to an eighth of a face.
+
+    Args:
+        nodes: of the mesh (N, 3), mm, in the frame of the points.
+        faces: of its skin (F, 4).
+        points: on the skin or near it.
+    """
+    facets = skin_facets(faces, len(nodes), _FACETS)
+    found = np.asarray(cKDTree(facets.positions(nodes)).query(points)[1], dtype=np.int64)
+    per_face = facets.interpolation.shape[0] // len(faces)
+    corners = np.asarray(faces, dtype=np.int64)[found // per_face]
+    rows = facets.interpolation[found]
+    shares = np.stack([np.asarray(rows[np.arange(len(points)), corners[:, c]]).ravel() for c in range(4)], axis=-1)
+    return corners, shares
+
+
+def point_ties(
+    corners: NDArray[np.int64], shares: NDArray[np.float64], targets: Points, stiffness: float
+) -> PlaneTies:
+    """Three springs a point, along the axes.
+
+    Args:
+        corners, shares: of `nearest_on_skin`.
+        targets: places (P, 3), mm.
+        stiffness: spring constant, mN/mm.
+    """
+    count = len(targets)
+    direction = np.tile(np.eye(3), (count, 1))
+    return PlaneTies(
+        np.repeat(corners, 3, axis=0),
+        np.repeat(shares, 3, axis=0),
+        direction,
+        np.asarray(targets, dtype=float).ravel(),
+        np.full(3 * count, stiffness),
+    )
