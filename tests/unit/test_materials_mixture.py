@@ -62,6 +62,15 @@ def test_bulk_modulus_follows_the_stiffness_that_is_reached() -> None:
     assert final > 5000.0 * gland.mu_kpa
 
 
+def test_reached_modulus_is_a_third_of_the_slope_in_compression() -> None:
+    shares = np.array([[1.0, 0.0], [0.3, 0.7]])
+    body = hyperelastic(TissueMixture((FAT, GLAND), shares)).of_elements(2)
+    expected = shares @ [float(law.tangent_kpa(0.4)) / 3.0 for law in (FAT, GLAND)]
+    np.testing.assert_allclose(body.reached_mu_kpa(0.4), expected, rtol=1e-9)
+    np.testing.assert_allclose(body.reached_mu_kpa(1e-4), body.mu_kpa, rtol=1e-3)
+    np.testing.assert_array_equal(hyperelastic(NeoHookean(9.0)).of_elements(3).reached_mu_kpa(0.5), np.full(3, 9.0))
+
+
 @pytest.mark.parametrize("stiffening", [0.0, 0.4, 3.0])
 def test_fibre_energy_has_its_derivatives_in_tension_and_none_in_compression(stiffening: float) -> None:
     fibres = Fibres(np.array([0.0, 0.0, 2.0]), 7.0, stiffening).of_elements(2)

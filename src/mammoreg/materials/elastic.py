@@ -59,6 +59,20 @@ class ElasticMaterial:
         fibres = None if self.fibres is None else self.fibres.part(elements)
         return ElasticMaterial(self.mu_kpa[elements], self.bulk_kpa[elements], fibres, law)
 
+    def reached_mu_kpa(self, compression: float) -> Array:
+        """Shear modulus that elements (E,) have reached at a uniaxial compression, a third of the slope of the stress.
+
+        The scale for what must hold against laws that stiffen by orders of magnitude, as a contact's penalty. The
+        initial modulus for neo-Hookean bodies; needs one value per element.
+        """
+        if self.law is None:
+            return self.mu_kpa
+        stretch = 1.0 - compression
+        i1 = np.full((len(self.mu_kpa), 1), stretch**2 + 2.0 / stretch)
+        slope, curvature = self.law.slope_kpa(i1)[:, 0], self.law.curvature_kpa(i1)[:, 0]
+        tangent = 2.0 * slope * (2.0 * stretch**-3 + 1.0) + 4.0 * curvature * (stretch**-2 - stretch) ** 2
+        return np.asarray(tangent / 3.0)
+
 
 def neo_hookean(
     mu_kpa: float | Array,
