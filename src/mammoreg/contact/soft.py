@@ -91,7 +91,7 @@ class SoftContact:
     @property
     def sticks(self) -> bool:
         """Whether friction has no limit."""
-        return np.isinf(self.friction)
+        return bool(np.isinf(self.friction))
 
     def start(self, nodes: Array, plates: Sequence[Plate], height: float) -> SoftMemory:
         """Memory of a body that has not pressed yet, at nodes (N, 3); where it touches already, sticking begins."""
@@ -100,7 +100,7 @@ class SoftContact:
         anchor = self._relative(nodes, plates, height)
         pressure = np.zeros(anchor.shape[:-1])
         if self.sticks:
-            points = self._points(nodes, height)
+            points = self.points(nodes, height)
             pressure = np.stack([self._barrier(plate.gap(points).distance)[0] for plate in plates])
         return SoftMemory(anchor, np.zeros_like(anchor), pressure)
 
@@ -119,13 +119,13 @@ class SoftContact:
 
     def augmented(self, nodes: Array, plates: Sequence[Plate], height: float, memory: SoftMemory) -> SoftMemory:
         """Memory whose shifts let each plate press as now with the points on its face, and no others."""
-        points = self._points(nodes, height)
+        points = self.points(nodes, height)
         distance = np.stack([self._distance(plate.gap(points), memory, k) for k, plate in enumerate(plates)])
         return replace(memory, shift=np.minimum(distance, self.band_mm))
 
     def terms(self, nodes: Array, height: float, plates: Sequence[Plate], memory: SoftMemory) -> SoftTerms:
         """Forces and tangent at nodes (N, 3) with the plates raised by `height` mm."""
-        points = self._points(nodes, height)
+        points = self.points(nodes, height)
         relative = self._relative(nodes, plates, height) if self.friction > 0.0 else None
         total, tangent = np.zeros(points.shape), np.zeros((*points.shape, 3))
         pressures, tractions, forces, deepest = [], [], [], 0.0
@@ -151,7 +151,7 @@ class SoftContact:
 
     def energy_mj(self, nodes: Array, height: float, plates: Sequence[Plate], memory: SoftMemory) -> float:
         """Potential of the pressure and of friction with its lagged limit."""
-        points = self._points(nodes, height)
+        points = self.points(nodes, height)
         relative = self._relative(nodes, plates, height) if self.friction > 0.0 else None
         density = np.zeros(points.shape[:-1])
         for k, plate in enumerate(plates):
@@ -162,14 +162,14 @@ class SoftContact:
                 density += self._friction_energy(dyad, memory, k, relative[k] - memory.anchor[k])
         return 1e-3 * float((density * self.surface.area).sum())
 
-    def _points(self, nodes: Array, height: float) -> Array:
+    def points(self, nodes: Array, height: float) -> Array:
         """Contact points (F, q, 3) as the plates see them that are raised by `height` mm."""
-        return self.surface.positions(nodes) - np.array([0.0, 0.0, height])
+        return np.asarray(self.surface.positions(nodes) - np.array([0.0, 0.0, height]))
 
     @staticmethod
     def _distance(gap: Gap, memory: SoftMemory, k: int) -> Array:
         """Distance (F, q) that the barrier of plate k takes."""
-        return gap.distance + memory.shift[k] if memory.shift.size else gap.distance
+        return np.asarray(gap.distance + memory.shift[k]) if memory.shift.size else gap.distance
 
     def _relative(self, nodes: Array, plates: Sequence[Plate], height: float) -> Array:
         points = self.surface.positions(nodes)

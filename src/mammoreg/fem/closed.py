@@ -71,10 +71,9 @@ def closed_state(
     terms, unbalance = equilibrium.terms(state, load.plates), equilibrium.unbalance(state, load)
     if unbalance > LARGEST_UNBALANCE:
         raise NotConvergedError(f"forces at rest are out of balance by {unbalance:.1%}")
-    if terms.penetration_mm > LARGEST_PENETRATION * gap_mm:
-        raise NotConvergedError(
-            f"the skin passes the plates by {terms.penetration_mm:.1f} mm at a gap of {gap_mm:.1f} mm"
-        )
+    passed = equilibrium.penetration_mm(state, load.plates)
+    if passed > LARGEST_PENETRATION * gap_mm:
+        raise NotConvergedError(f"the skin passes the plates by {passed:.1f} mm at a gap of {gap_mm:.1f} mm")
     forces = np.abs(terms.plate_force[:, 2]) * 1e-3
     force_n = (float(forces[0]), float(forces[1]))
     parts = parts_at((*equilibrium.springs, *(state.parts or ())), load.share)

@@ -171,6 +171,12 @@ class DampedEquilibrium:
         self._fit(lagged)
         return DampedStep(self, start, load, parts_at((*self.springs, *lagged), load.share), damping)
 
+    def penetration_mm(self, state: DampedState, plates: Sequence[Plate]) -> float:
+        """How deep skin lies in a plate that could give way: faces whose height is held somewhere are left out."""
+        free = ~self.held[self.contact.surface.quads, 2].any(axis=1)
+        points = self.contact.points(state.positions, state.height)[free].reshape(-1, 3)
+        return max(0.0, *(-float(plate.gap(points).distance.min(initial=0.0)) for plate in plates))
+
     def terms(self, state: DampedState, plates: Sequence[Plate]) -> SoftTerms:
         """Contact at a state."""
         return self.contact.terms(state.positions, state.height, plates, state.memory)

@@ -10,10 +10,12 @@ from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
 from mammoreg.fem.model import HyperelasticModel, Residual
 from mammoreg.fem.parts import Part, Parts, all_nodes, back_springs, parts_at
+from mammoreg.fem.report import Stopwatch
 from mammoreg.fem.sparse import Array
 from mammoreg.fem.system import NewtonSystem
 
 LEAST_DET_SHARE = 0.1
+NEGLIGIBLE = 1e-6  # of the largest last displacement
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,7 @@ class Equilibrium:
     Attributes:
         parts: as renewed after the last solve.
         residuals: residual ratio of every iteration so far.
+        watch: where the time goes.
     """
 
     def __init__(
@@ -65,6 +68,7 @@ class Equilibrium:
         self.model, self.held = model, held
         self.parts: Parts = (*back_springs(back, all_nodes(model.points, extra_nodes)), *parts)
         self.residuals: list[float] = []
+        self.watch = Stopwatch()
         self.system = self._system()
 
     def _system(self) -> NewtonSystem:
@@ -88,14 +92,18 @@ class Equilibrium:
         pending = np.where(self.held, targets - start.positions, 0.0).ravel()
         imposed: Array | None = pending if pending.any() else None
         for _ in range(options.iterations):
-            internal, vectors, blocks = self._terms(state, acting)
+            with self.watch.timing("assembly"):
+                internal, vectors, blocks = self._terms(state, acting)
             volume = float(np.abs(internal.volume / self.model.volume).max())
             ratio = max(self.system.unbalance(vectors), volume)
             self.residuals.append(ratio)
-            if imposed is None and ratio < options.residual and last < options.increment_mm:
+            # Without any strain forces are rounding errors, and so is their balance.
+            balanced = ratio < options.residual or last < NEGLIGIBLE * options.increment_mm
+            if imposed is None and balanced and last < options.increment_mm:
                 self._renew(state)
                 return state
-            update, pressure = self.system.increment(internal, vectors, blocks, imposed)
+            with self.watch.timing("linear"):
+                update, pressure = self.system.increment(internal, vectors, blocks, imposed)
             admissible = self.system.admissible(state.positions, update, LEAST_DET_SHARE)
             if imposed is not None and admissible < 1.0:
                 raise NotConvergedError("an element turns inside out")
@@ -107,6 +115,10 @@ class Equilibrium:
     def reaction(self, state: State, share: float = 1.0) -> Array:
         """Force (N, 3) in mN that holds the nodes in a state."""
         return self.system.sum(self._terms(state, parts_at(self.parts, share))[1]).reshape(-1, 3)
+
+    def unbalance(self, state: State) -> float:
+        """Ratio of unbalanced to internal forces at a state under the whole load."""
+        return self.system.unbalance(self._terms(state, self.parts)[1])
 
     def _renew(self, state: State) -> None:
         before, self.parts = self.parts, tuple(part.renewed(state.positions) for part in self.parts)

@@ -11,6 +11,7 @@ from mammoreg.fem.boundary import Array, BackCondition
 from mammoreg.fem.equilibrium import Equilibrium, NewtonOptions, State
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.parts import Part, all_nodes
+from mammoreg.fem.report import SolveReport, solve_report
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ class PrescribedResult:
         volume_change: relative change of the whole volume.
         reaction_n: force (3,) that holds the prescribed nodes.
         extra: extra nodes (M, 3), mm, or None.
+        report: of the solve.
     """
 
     deformed: Array
@@ -56,6 +58,7 @@ class PrescribedResult:
     volume_change: float
     reaction_n: Array
     extra: Array | None = None
+    report: SolveReport | None = None
 
 
 def solve_prescribed(
@@ -108,18 +111,38 @@ def solve_prescribed(
         done, steps = share, steps + 1
         if len(equilibrium.residuals) - before <= options.easy_iterations:
             step *= 2.0
+    return _result(equilibrium, state, nodes, steps, cuts)
+
+
+def _result(
+    equilibrium: Equilibrium, state: State, nodes: NDArray[np.integer], steps: int, cuts: int
+) -> PrescribedResult:
+    """The result in a state, and its report."""
+    model, count = equilibrium.model, len(equilibrium.model.points)
+    report = solve_report(
+        model,
+        state.positions,
+        state.pressure,
+        equilibrium.parts,
+        equilibrium.residuals,
+        equilibrium.watch,
+        steps=steps,
+        cuts=cuts,
+        unbalance=equilibrium.unbalance(state),
+    )
     return PrescribedResult(
-        deformed=state.positions[: len(model.points)],
+        deformed=state.positions[:count],
         pressure=state.pressure,
-        iterations=len(equilibrium.residuals),
+        iterations=report.iterations,
         steps=steps,
         cuts=cuts,
         residuals=equilibrium.residuals,
-        energy_mj=model.energy_mj(state.positions),
-        min_det_f=float(model.determinants(state.positions).min()),
-        volume_change=model.volume_change(state.positions),
+        energy_mj=report.isochoric_mj,
+        min_det_f=report.min_det_f,
+        volume_change=report.volume_change,
         reaction_n=1e-3 * equilibrium.reaction(state)[nodes].sum(axis=0),
-        extra=None if extra_nodes is None else state.positions[len(model.points) :],
+        extra=None if len(state.positions) == count else state.positions[count:],
+        report=report,
     )
 
 

@@ -99,7 +99,7 @@ class Resting:
         """The contact's shifts renewed until nothing lies too deep in a plate."""
         plates = self.load.plates
         for _ in range(self.options.augmentations):
-            if contact.terms(state, plates).penetration_mm <= self.options.penetration_mm:
+            if contact.penetration_mm(state, plates) <= self.options.penetration_mm:
                 break
             memory = contact.contact.augmented(state.positions, plates, state.height, state.memory)
             state = contact.step(replace(state, memory=memory), self.load, damping, self.options.tolerance_mm)
