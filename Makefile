@@ -1,4 +1,4 @@
-# make run | test | check | bench: each sets up .venv by itself, from the hashed locks.
+# make run | test | verify | check | bench: each sets up .venv by itself, from the hashed locks.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= all
 BIN := .venv/bin
@@ -6,13 +6,14 @@ SHELL := /bin/bash
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help run test check bench lock generated
+.PHONY: help run test verify check bench lock generated
 
 help:
 	@echo "make run    the embedded cohort on all cores, then where report and tables are (CORES=2 for fewer)"
 	@echo "make test   the test suite"
+	@echo "make verify the verification of the finite elements, with what takes minutes"
 	@echo "make check  formatting, lint, types, import boundaries, workflow lint"
-	@echo "make bench  time and memory of a two-view case, stage by stage"
+	@echo "make bench  time and memory of the solver, beside peers, and of a two-view case, stage by stage"
 
 run: .venv/runtime
 	$(BIN)/snakemake --cores $(CORES); status=$$?; \
@@ -20,6 +21,9 @@ run: .venv/runtime
 
 test: .venv/development
 	$(BIN)/python -m pytest -n auto --dist loadfile
+
+verify: .venv/development
+	$(BIN)/python -m pytest -n auto --dist loadfile -m "slow or not slow" tests/verification
 
 check: .venv/development
 	$(BIN)/ruff format --check .
@@ -30,6 +34,7 @@ check: .venv/development
 	$(BIN)/snakemake --lint json 2>&1 | $(BIN)/python workflow/scripts/check_lint.py
 
 bench: .venv/runtime
+	$(BIN)/python -m benchmarks.solver
 	$(BIN)/python benchmarks/two_view_case.py
 
 # The locks hold no index address, so that any mirror serves.

@@ -66,7 +66,7 @@ def test_iterative_update_is_the_direct_one(
     expected, expected_pressure = direct.increment()
     assert (iterative.system.factorisations, direct.system.factorisations) == (0, 1)
     assert iterative.system.krylov[0] <= most
-    assert np.abs(rough - expected).max() < 0.02 * np.abs(expected).max()
+    assert np.abs(rough - expected).max() < 0.05 * np.abs(expected).max()
     assert np.abs(update - expected).max() < 1e-4 * np.abs(expected).max()
     assert np.abs(pressure - expected_pressure).max() < 1e-3 * np.abs(expected_pressure).max()
 

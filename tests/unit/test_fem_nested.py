@@ -30,6 +30,14 @@ def test_a_few_iterations_remain_on_the_fine_mesh(percent: int) -> None:
     assert nested[-1].iterations < 0.6 * direct.iterations
 
 
+def test_start_that_would_turn_elements_inside_out_is_made_at_a_wider_gap() -> None:
+    gap = 0.5 * HEIGHT_MM
+    nested, direct = close_nested(breast_closing(12), gap), breast_closing(12).close(gap)
+    assert nested[-1].steps == 2
+    assert nested[-1].iterations == len(nested[-1].residuals) < direct.iterations
+    assert np.abs(nested[-1].deformed - direct.deformed).max() < UNDAMPED.tolerance_mm
+
+
 def test_heterogeneous_breast_with_friction_between_ending_plates() -> None:
     centre = breast_block(10).points[breast_block(10).hexes()].mean(axis=1)
     mu = np.where(np.linalg.norm(centre - [0.0, -30.0, 0.0], axis=1) < 25.0, 8.0, 1.0)

@@ -168,6 +168,15 @@ class Closing:
         eased = resting.eased(resting.stiff, state, self.options.damping)
         return resting.rested(resting.stiff, eased, STIFF_DAMPING * self.options.damping)
 
+    def further(self, closed: Closed, gap_mm: float) -> Closed:
+        """Go on from a closed state, which was not tied to an outline, to a narrower gap in one step.
+
+        Raises:
+            NotConvergedError: with the reason.
+        """
+        way = Way(closed.state, closed.gap_mm, closed.steps, closed.cuts)
+        return self._closed_further(self.equilibrium(), way, gap_mm, soft=False)
+
     def rest(self, closed: Closed, outline: Part, damping: float) -> Closed:
         """Go on from a closed state with an outline drawing on the skin.
 
@@ -234,7 +243,11 @@ class Closing:
         guess = self.predictor.predict(state.positions, state.height, load.plates, gap / way.gap_mm)
         if self.model.determinants(guess).min() < LEAST_GUESS_DET:
             guess = state.positions
-        start = replace(state, positions=np.where(equilibrium.held, equilibrium.anchors(share), guess))
+        held, anchors = equilibrium.held, equilibrium.anchors(share)
+        positions = np.where(held, anchors, guess)
+        if self.model.determinants(positions).min() <= 0.0:
+            positions = np.where(held, anchors, state.positions)
+        start = replace(state, positions=positions)
         return equilibrium.step(start, load, self.options.damping, self.options.tolerance_mm)
 
     def _force_n(self, equilibrium: DampedEquilibrium, way: Way) -> float:

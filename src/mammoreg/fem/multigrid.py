@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 DEGREE = 3
 SMOOTHED_SHARE = 1.0 / 8.0  # of the spectrum, from its upper end, that the smoother acts on
-POWER_STEPS = 10
+FIRST_POWER_STEPS, POWER_STEPS = 12, 5  # the later ones start from the last vector
 SAFETY = 1.15  # the power iteration finds the largest eigenvalue from below
 
 
@@ -36,6 +36,7 @@ class TwoGrid:
         self._down = self._prolongation(hierarchy)
         self._up = sp.csr_array(self._down.T)
         self._indices, self._indptr = hierarchy.stencil(), 27 * np.arange(self.nodes + 1, dtype=np.int32)
+        self._power_steps = FIRST_POWER_STEPS
         self._vector = np.where(free, np.random.default_rng(0).standard_normal(self.total), 0.0)
 
     def _prolongation(self, hierarchy: Hierarchy) -> sp.csr_array:
@@ -85,10 +86,10 @@ class TwoGrid:
 
     def solve(self, residual: Array) -> Array:
         """One symmetric cycle: smooth, correct on the coarse grid, smooth."""
-        change, remaining = self._smooth(residual)
+        change = self._smooth(residual)
+        remaining = residual - self.apply(change)
         correction = self._down @ self._coarse.back_substitute(self._up @ remaining)
-        after, _ = self._smooth(remaining - self.apply(correction))
-        return np.asarray(change + correction + after)
+        return np.asarray(change + correction + self._smooth(remaining - self.apply(correction)))
 
     def _diagonal_blocks(self, values: Array) -> Array:
         """3 x 3 blocks (nodes, 3, 3) of the whole matrix; identity at held components."""
@@ -111,30 +112,29 @@ class TwoGrid:
     def _largest_eigenvalue(self) -> float:
         """Of the Jacobi-scaled matrix, by power iteration from the last one's vector."""
         vector, largest = self._vector, 1.0
-        for _ in range(POWER_STEPS):
+        for _ in range(self._power_steps):
             product = self._jacobi(self.apply(vector))
             largest = float(np.linalg.norm(product))
             if not (np.isfinite(largest) and largest > 0.0):
                 raise NotConvergedError("the stiffness holds values that are not finite")
             vector = product / largest
-        self._vector = vector
+        self._vector, self._power_steps = vector, POWER_STEPS
         return SAFETY * largest
 
-    def _smooth(self, residual: Array) -> tuple[Array, Array]:
-        """Chebyshev iteration from zero: the change and the residual that remains."""
+    def _smooth(self, residual: Array) -> Array:
+        """Chebyshev iteration from zero."""
         high, low = self._largest, SMOOTHED_SHARE * self._largest
         middle, half = 0.5 * (high + low), 0.5 * (high - low)
         ratio = half / middle
         step = self._jacobi(residual) / middle
-        change = step.copy()
-        remaining = residual - self.apply(step)
+        change, remaining = step, residual
         for _ in range(DEGREE - 1):
+            remaining = remaining - self.apply(step)
             after = 1.0 / (2.0 * middle / half - ratio)
             step = after * ratio * step + 2.0 * after / half * self._jacobi(remaining)
-            change += step
-            remaining -= self.apply(step)
+            change = change + step
             ratio = after
-        return change, remaining
+        return np.asarray(change)
 
     def _factor(self) -> PardisoSolver | SuperLuSolver:
         """The coarse matrix, factorised."""

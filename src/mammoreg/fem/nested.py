@@ -19,6 +19,7 @@ from mammoreg.meshing.block import BlockMesh
 COARSEST = 8  # elements a side up to which a mesh is closed on its own
 NEAREST_POINTS = 4
 LEAST_START_DET = 0.02  # an interpolated start that squeezes an element further is not used
+WIDER_SHARE = 0.6  # of the plates' way, to start from instead
 
 _log = logging.getLogger(__name__)
 
@@ -79,12 +80,29 @@ def _closed(coarse: Closing | None, fine: Closing, found: list[Closed], gap_mm: 
     """Let a body rest where the coarser one does or, where that fails, close the plates on it."""
     if coarse is not None:
         try:
-            start = _carried(found[-1], coarse, fine)
-            if fine.model.determinants(start.positions).min() > LEAST_START_DET:
-                return fine.resume(start, gap_mm)
+            return _resumed(coarse, fine, found[-1]) or _half_resumed(coarse, fine, gap_mm)
         except NotConvergedError as error:
             _log.info("the start from a coarser mesh fails: %s", error)
     return fine.close(gap_mm)
+
+
+def _resumed(coarse: Closing, fine: Closing, closed: Closed) -> Closed | None:
+    """A body at rest where the coarser one is; None: its elements would be squeezed too far there."""
+    start = _carried(closed, coarse, fine)
+    if fine.model.determinants(start.positions).min() < LEAST_START_DET:
+        return None
+    return fine.resume(start, closed.gap_mm)
+
+
+def _half_resumed(coarse: Closing, fine: Closing, gap_mm: float) -> Closed:
+    """A body started from the coarser one at a wider gap, then closed further."""
+    wider = coarse.uncompressed_mm + WIDER_SHARE * (gap_mm - coarse.uncompressed_mm)
+    half = _resumed(coarse, fine, coarse.close(wider))
+    if half is None:
+        raise NotConvergedError("elements of a coarser mesh's answer turn inside out on the finer one")
+    whole = fine.further(half, gap_mm)
+    residuals = [*half.residuals, *whole.residuals]
+    return replace(whole, iterations=len(residuals), steps=half.steps + 1, residuals=residuals)
 
 
 def _carried(closed: Closed, coarse: Closing, fine: Closing) -> DampedState:

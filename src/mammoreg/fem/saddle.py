@@ -24,7 +24,7 @@ from mammoreg.fem.multigrid import TwoGrid
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-RESIDUAL = 1e-3
+RESIDUAL = 3e-3
 ITERATIONS = 200
 AUGMENTATION = 8.0  # gamma in units of the shear modulus: more helps the pressures and costs the displacements
 LARGEST_SHARE = 0.5  # gamma as a share of K, at most
