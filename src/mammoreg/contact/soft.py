@@ -136,7 +136,7 @@ class SoftContact:
             tangent += slope[..., None, None] * dyad - pressure[..., None, None] * gap.hessian()
             force = pressure[..., None] * gap.normal
             if relative is not None:
-                traction, stick = self._friction(dyad, memory, k, relative[k] - memory.anchor[k])
+                traction, stick = self._friction(plate, memory, k, relative[k] - memory.anchor[k])
                 tangent += stick
                 force = force + traction
                 tractions.append(traction)
@@ -158,8 +158,7 @@ class SoftContact:
             gap = plate.gap(points)
             density += self._barrier_energy(self._distance(gap, memory, k))
             if relative is not None:
-                dyad = gap.normal[..., :, None] * gap.normal[..., None, :]
-                density += self._friction_energy(dyad, memory, k, relative[k] - memory.anchor[k])
+                density += self._friction_energy(plate, memory, k, relative[k] - memory.anchor[k])
         return 1e-3 * float((density * self.surface.area).sum())
 
     def points(self, nodes: Array, height: float) -> Array:
@@ -197,10 +196,10 @@ class SoftContact:
         limit = self.friction * pressure
         return limit, np.maximum(limit, self.friction * STICKING_PRESSURE_KPA) / self.slip_mm
 
-    def _friction(self, dyad: Array, memory: SoftMemory, k: int, slip: Array) -> tuple[Array, Array]:
+    def _friction(self, plate: Plate, memory: SoftMemory, k: int, slip: Array) -> tuple[Array, Array]:
         """Radial return within a disc of lagged radius: traction (F, q, 3) and its stiffness (F, q, 3, 3)."""
         limit, stick = self._limit(memory.pressure[k])
-        plane = np.eye(3) - dyad
+        plane = _tangential(plate, memory.anchor[k])
         trial = np.einsum("fqij,fqj->fqi", plane, memory.traction[k] - stick[..., None] * slip)
         size = np.linalg.norm(trial, axis=-1)
         safe = np.where(size > 0.0, size, 1.0)
@@ -210,10 +209,11 @@ class SoftContact:
         along = np.where(slides[..., None, None], direction[..., :, None] * direction[..., None, :], 0.0)
         return trial * share[..., None], (share * stick)[..., None, None] * (plane - along)
 
-    def _friction_energy(self, dyad: Array, memory: SoftMemory, k: int, slip: Array) -> Array:
-        """Potential per area, mN/mm, of `_friction` on a flat face."""
+    def _friction_energy(self, plate: Plate, memory: SoftMemory, k: int, slip: Array) -> Array:
+        """Potential per area, mN/mm, of `_friction`."""
         limit, stick = self._limit(memory.pressure[k])
-        trial = np.einsum("fqij,fqj->fqi", np.eye(3) - dyad, memory.traction[k] - stick[..., None] * slip)
+        plane = _tangential(plate, memory.anchor[k])
+        trial = np.einsum("fqij,fqj->fqi", plane, memory.traction[k] - stick[..., None] * slip)
         size = np.linalg.norm(trial, axis=-1)
         within = np.minimum(size, limit)
         return np.asarray(within * (size - 0.5 * within) / np.where(stick > 0.0, stick, np.inf))
@@ -227,6 +227,12 @@ class SoftContact:
         flat = interpolation.reshape(-1, 13)
         product = (stiffness * self.surface.area[..., None, None]) @ interpolation
         return force.reshape(faces, -1) @ flat, flat.T @ product.reshape(faces, -1, 13)
+
+
+def _tangential(plate: Plate, anchor: Array) -> Array:
+    """Projections (F, q, 3, 3) onto the plate's face at the anchors, where friction acts: fixed within a step."""
+    normal = plate.gap(anchor + np.array([0.0, 0.0, plate.height_mm])).normal
+    return np.asarray(np.eye(3) - normal[..., :, None] * normal[..., None, :])
 
 
 def plate_pair(gap_mm: float, middle_mm: float, edge_p_mm: float | None, lip_radius_mm: float) -> tuple[Plate, Plate]:
