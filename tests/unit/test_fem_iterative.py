@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem import saddle
+from mammoreg.fem import linear, saddle
 from mammoreg.fem.hierarchy import Hierarchy
 from mammoreg.fem.krylov import fgmres
 from mammoreg.fem.model import HyperelasticModel
@@ -87,6 +87,13 @@ def test_direct_solve_steps_in_where_the_iteration_does_not_converge(monkeypatch
     np.testing.assert_allclose(broken.increment()[0], direct.increment()[0], atol=1e-9)
     assert broken.system.factorisations == 1
     assert broken.system.krylov == []
+
+
+def test_scipy_alone_gives_the_same_iterative_update(monkeypatch: pytest.MonkeyPatch) -> None:
+    material = neo_hookean(10.0, 0.49)
+    expected = Squeezed(material, Hierarchy(SIZE, 4)).increment()[0]
+    monkeypatch.setattr(linear, "pypardiso", None)
+    np.testing.assert_allclose(Squeezed(material, Hierarchy(SIZE, 4)).increment()[0], expected, atol=1e-7)
 
 
 def test_gmres_solves_an_indefinite_system_across_restarts_and_says_where_it_stopped() -> None:
