@@ -99,9 +99,8 @@ def test_a_wrong_force_plate_or_pressure_fails(solved):
     scene, closed = solved
     lower, upper = closed.force_n
     assert failed(scene, replace(closed, force_n=(1.05 * lower, upper))) == {"reported plate force"}
-    memory = closed.state.memory
-    weaker = replace(memory, pressure=memory.pressure * np.array([1.0, 0.9])[:, None, None])
-    wrong = failed(scene, replace(closed, state=replace(closed.state, memory=weaker)))
+    weaker = replace(closed.contact, pressure=closed.contact.pressure * np.array([1.0, 0.9])[:, None, None])
+    wrong = failed(scene, replace(closed, contact=weaker))
     assert {"unbalanced force", "difference of the plates' forces"} <= wrong
     assert "load away from the plates" in failed(scene, replace(closed, height_mm=closed.height_mm - 20.0))
 

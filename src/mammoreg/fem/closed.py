@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mammoreg.contact.soft import SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
 from mammoreg.fem.parts import parts_at
@@ -33,6 +34,7 @@ class Closed:
         state: to go on from.
         extra: extra nodes (M, 3), mm, or None.
         report: of the solve, where there was one.
+        contact: pressures and friction at rest, where there was a solve.
     """
 
     deformed: Array
@@ -51,6 +53,7 @@ class Closed:
     state: DampedState
     extra: Array | None = None
     report: SolveReport | None = None
+    contact: SoftTerms | None = None
 
 
 def closed_state(
@@ -107,4 +110,5 @@ def closed_state(
         state=state,
         extra=None if len(equilibrium.points) == count else state.positions[count:],
         report=report,
+        contact=terms,
     )

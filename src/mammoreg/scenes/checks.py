@@ -72,8 +72,11 @@ def _pressed(scene: Scene, closed: Closed) -> Pressed:
     faces = tuple(
         PlateFace(height, facing, scene.edge_p_mm, LIP_RADIUS_MM) for height, facing in ((lower, 1), (upper, -1))
     )
-    memory = closed.state.memory
-    return Pressed((faces[0], faces[1]), scene.skin_quads, memory.pressure, memory.traction)
+    assert closed.contact is not None
+    pressure, traction = closed.contact.pressure, closed.contact.traction
+    if not traction.size:
+        traction = np.zeros((*pressure.shape, 3))
+    return Pressed((faces[0], faces[1]), scene.skin_quads, pressure, traction)
 
 
 def _unbalance(scene: Scene, closed: Closed, inner: InnerForces, plates: Floats) -> float:

@@ -18,6 +18,9 @@ EDGE_MM = 8.0
 LIP_RADIUS_MM = 8.0
 BACK_LAYER_MM = 35.0
 """Tissue between the back and the chest wall, which shears as the back slides; as in the pipeline."""
+OPTIONS = ClosingOptions(rests=24, stiffening=(3.0, 10.0, 30.0, 100.0, 300.0))
+"""The pipeline's settings, but for a contact that ends stiffer: laws that stiffen press through the pipeline's by
+several millimetres at the lips, whose stiffness is measured by the mean initial shear modulus."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class Scene:
         return self.closing.close((1.0 - self.scenario.compression) * self.closing.uncompressed_mm)
 
 
-def build_scene(scenario: Scenario, mesh: BlockMesh, options: ClosingOptions | None = None) -> Scene:
+def build_scene(scenario: Scenario, mesh: BlockMesh, options: ClosingOptions = OPTIONS) -> Scene:
     """The scene of a scenario on a mesh of its shape (breast frame, `scenario.elements` a side)."""
     gland = gland_share(scenario.elements)
     tissue = scene_tissue(scenario.material, scenario.poisson, scenario.contrast, scenario.compression, gland)
