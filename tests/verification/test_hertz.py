@@ -5,7 +5,8 @@ a^2 = R d. A layer of thickness h that is bonded to its base is stiffer by a ser
 et al. 2002, Biophys. J. 82, equation 9, for a sphere pressed into a layer, which is the same contact at small strain).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from tests.verification.febio import boundary_faces
 from tests.verification.hex_bodies import Floats, brick
 
 MU, RADIUS, THICK, WIDTH = 10.0, 500.0, 80.0, 200.0
-ELEMENTS, SMALLEST = 13, 0.9
+DEPTH, ELEMENTS, SMALLEST = 0.05, 13, 0.9
 STIFF = ClosingOptions(
     steps=2, tolerance_mm=1e-5, damping=1e-9, rests=2, stiffening=(), penalty_per_mm=2000.0, band_mm=1e-4, rule="nodes"
 )
@@ -66,6 +67,7 @@ def curved(unit: Floats) -> Floats:
     return np.stack([x, y, share * (THICK - (x**2 + y**2) / (2.0 * RADIUS))], axis=1)
 
 
+@cache
 def pressed(poisson: float, depth: float, options: ClosingOptions) -> Pressed:
     """The layer on its glued base, its planes of symmetry held, its far sides free."""
     points, hexes = brick((ELEMENTS, ELEMENTS, ELEMENTS), curved)
@@ -88,9 +90,8 @@ def pressed(poisson: float, depth: float, options: ClosingOptions) -> Pressed:
 
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])
 def test_force_and_pressure(poisson: float) -> None:
-    depth = 0.05
-    found, radius = pressed(poisson, depth, STIFF), (RADIUS * depth) ** 0.5
-    expected = hertz_force(poisson, depth)
+    found, radius = pressed(poisson, DEPTH, STIFF), (RADIUS * DEPTH) ** 0.5
+    expected = hertz_force(poisson, DEPTH)
     assert found.force_n == pytest.approx(expected, rel=0.015)
     highest = 3e3 * expected / (2.0 * np.pi * radius**2)
     ellipse = highest * np.sqrt(np.maximum(1.0 - (found.distance / radius) ** 2, 0.0))
@@ -100,5 +101,17 @@ def test_force_and_pressure(poisson: float) -> None:
 
 
 def test_force_grows_with_the_power_of_three_halves() -> None:
-    shallow, deep = (pressed(0.3, depth, STIFF).force_n / hertz_force(0.3, depth) for depth in (0.04, 0.08))
+    shallow, deep = (pressed(0.3, depth, STIFF).force_n / hertz_force(0.3, depth) for depth in (DEPTH, 1.6 * DEPTH))
     assert shallow == pytest.approx(deep, rel=0.025)
+
+
+@pytest.mark.slow
+def test_augmentation_takes_back_what_a_soft_contact_lets_in() -> None:
+    """A barrier 2000 times softer, in which the middle would lie a third of the depth behind the plate."""
+    soft = replace(STIFF, penalty_per_mm=1.0, band_mm=1e-3)
+    plain, augmented, stiff = (
+        pressed(0.3, DEPTH, options).force_n
+        for options in (soft, replace(soft, augmentations=30, penetration_mm=2e-4), STIFF)
+    )
+    assert plain < 0.8 * stiff
+    assert augmented == pytest.approx(stiff, rel=0.01)

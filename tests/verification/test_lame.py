@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from mammoreg.fem.equilibrium import NewtonOptions
+from mammoreg.fem.linear_elastic import LinearElasticBody
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.materials.elastic import ElasticMaterial, bulk_ratio, hyperelastic, neo_hookean
 from mammoreg.materials.exponential import Exponential
@@ -13,6 +15,17 @@ from tests.verification.hex_bodies import Floats, Indices, brick, spherical_shel
 
 INNER, OUTER = 20.0, 40.0
 MU = 10.0
+
+
+def displaced(
+    model: HyperelasticModel, held: NDArray[np.bool_], targets: Floats, linear: bool
+) -> tuple[Floats, Floats]:
+    """Displacements (N, 3), mm, and the forces (N, 3), mN, that hold the nodes: linear, or finite strains as small."""
+    if linear:
+        small = LinearElasticBody(model, held).solve(targets - model.points)
+        return small.displacement, small.reaction
+    solved = solve(model, held, targets, options=NewtonOptions(1e-8, 1e-8))
+    return solved.deformed - model.points, solved.reaction
 
 
 def root_mean_square(vectors: Floats) -> float:
@@ -30,7 +43,7 @@ def quarter_cylinder(around: int, layers: int) -> tuple[Floats, Indices]:
     return brick((layers, around, 1), bent)
 
 
-def errors_in_a_cylinder(poisson: float, layers: int) -> tuple[float, float]:
+def errors_in_a_cylinder(poisson: float, layers: int, linear: bool) -> tuple[float, float]:
     """Errors of displacement (root mean square over the inner one) and of inner pressure (relative).
 
     Plane strain (Timoshenko and Goodier, Theory of Elasticity, 1970, article 28): u = A r + B / r with a free outside,
@@ -48,23 +61,24 @@ def errors_in_a_cylinder(poisson: float, layers: int) -> tuple[float, float]:
     targets = points.copy()
     targets[inside, :2] *= 1.0 + moved / INNER
     model = HyperelasticModel(points, hexes, neo_hookean(MU, poisson))
-    solved = solve(model, held, targets, options=NewtonOptions(1e-8, 1e-8))
-    error = root_mean_square(solved.deformed[:, :2] - points[:, :2] - expected) / moved
+    displacement, reaction = displaced(model, held, targets, linear)
+    error = root_mean_square(displacement[:, :2] - expected) / moved
     # Forces on the inside work on the radial motion there; the nodes in the planes of symmetry carry other forces.
-    work = (solved.reaction[inside, :2] * points[inside, :2] / INNER).sum()
+    work = (reaction[inside, :2] * points[inside, :2] / INNER).sum()
     across = 0.5 * np.pi * INNER * points[:, 2].max()
     return error, float(abs(work / across / (2.0 * MU * b * (INNER**-2 - OUTER**-2)) - 1.0))
 
 
+@pytest.mark.parametrize("linear", [True, False], ids=["linear", "finite strain"])
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])
-def test_cylinder_converges_to_lame(poisson: float) -> None:
-    coarse, fine = (errors_in_a_cylinder(poisson, layers) for layers in (6, 12))
+def test_cylinder_converges_to_lame(poisson: float, linear: bool) -> None:
+    coarse, fine = (errors_in_a_cylinder(poisson, layers, linear) for layers in (6, 12))
     assert fine[0] < 1e-4
     assert fine[1] < 2e-4
     assert coarse[1] / fine[1] > 3.5
 
 
-def sphere_errors(poisson: float, across: int) -> tuple[float, float]:
+def sphere_errors(poisson: float, across: int, linear: bool) -> tuple[float, float]:
     """As for the cylinder; u = A r + B / r^2, 3 K A = 4 mu B / b^3, p = 4 mu B (1 / a^3 - 1 / b^3)."""
     points, hexes = spherical_shell(INNER, OUTER, across, across)
     moved = 1e-5 * INNER
@@ -76,16 +90,17 @@ def sphere_errors(poisson: float, across: int) -> tuple[float, float]:
     held = np.repeat(inside[:, None], 3, axis=1)
     targets = points * (1.0 + moved / INNER * inside[:, None])
     model = HyperelasticModel(points, hexes, neo_hookean(MU, poisson))
-    solved = solve(model, held, targets, options=NewtonOptions(1e-8, 1e-8))
-    error = root_mean_square(solved.deformed - points - expected) / moved
-    force = (solved.reaction[inside] * points[inside] / INNER).sum()
+    displacement, reaction = displaced(model, held, targets, linear)
+    error = root_mean_square(displacement - expected) / moved
+    force = (reaction[inside] * points[inside] / INNER).sum()
     pressure = force / (4.0 * np.pi * INNER**2)
     return error, float(abs(pressure / (4.0 * MU * b * (INNER**-3 - OUTER**-3)) - 1.0))
 
 
+@pytest.mark.parametrize("linear", [True, False], ids=["linear", "finite strain"])
 @pytest.mark.parametrize("poisson", [0.3, 0.4999])
-def test_sphere_converges_to_lame(poisson: float) -> None:
-    coarse, fine = (sphere_errors(poisson, across) for across in (4, 8))
+def test_sphere_converges_to_lame(poisson: float, linear: bool) -> None:
+    coarse, fine = (sphere_errors(poisson, across, linear) for across in (4, 8))
     assert fine[0] < 1.1e-3
     assert fine[1] < 0.01
     assert coarse[0] / fine[0] > 3.5
