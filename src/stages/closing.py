@@ -50,15 +50,16 @@ def closing_plates(
         mechanics.friction,
         options,
         lower_mm,
-        breast.skin.parts,
+        (*breast.loads, *breast.skin.parts),
         breast.skin.extra_nodes,
+        mechanics.moving if lower_mm is None else "both",
     )
 
 
 def kept_values(mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, angle_deg: float) -> dict[str, Value]:
     """What later stages need to know of a compression."""
     return {
-        "mechanics": mechanics.model_dump(),
+        "mechanics": mechanics.plain(),
         "options": asdict(options),
         "mu_kpa": mu_kpa,
         "angle_deg": angle_deg,

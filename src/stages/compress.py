@@ -1,18 +1,22 @@
 """Stage `compress`: the breast between two rigid plates (paper, section II-C, plate compression)."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from mammoreg.contact.soft import touching
+from mammoreg.errors import DataError
 from mammoreg.fem.closing import Closed, ClosingOptions
 from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.meshing.block import BlockMesh
+from stages.artefact import Artefact
 from stages.closing import closing_plates, kept_arrays, kept_values
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.mechanics import Mechanics, place_breast
 from stages.methods import block_mesh, view_geometry
+from stages.solving import report_values, seconds_text
 from stages.tissue_map import gland_share, gland_share_array
 
 
@@ -20,6 +24,11 @@ class Settings(SettingsModel):
     """Mechanics, and how the plates close."""
 
     mechanics: Mechanics = Field(Mechanics(), description="tissue, plates and back")
+    stop: Literal["thickness", "force"] = Field(
+        "thickness",
+        description="where the plates stop: at the thickness of the pose (the paper), or at the force that the "
+        "mammogram's header or table gives",
+    )
     load_steps: int = Field(8, ge=1, le=200, description="load steps at least")
     tolerance_mm: float = Field(0.05, gt=0.0, le=1.0, description="Newton iterations end below this displacement, mm")
     penalty_per_mm: float = Field(
@@ -28,7 +37,7 @@ class Settings(SettingsModel):
 
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
-    """Close the plates to the thickness of the pose."""
+    """Close the plates to the thickness of the pose, or to its force."""
     pose = inputs.artefact("pose")
     view = view_geometry(pose)
     lower_mm = view.height_mm if pose.value("plates_known") else None
@@ -44,7 +53,9 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         penalty_per_mm=settings.penalty_per_mm * breast.stiffening,
     )
     closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options, lower_mm)
-    closed = closing.close(view.thickness_mm)
+    by_force = settings.stop == "force"
+    closed = closing.close_to_force(_force_n(pose)) if by_force else closing.close(view.thickness_mm)
+    print(seconds_text(closed.report), flush=True)
     # The floating breast is placed where the pose has seen the plates.
     lift = np.array([0.0, 0.0, view.height_mm - closed.height_mm])
     return Fields(
@@ -55,7 +66,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             **gland_share_array(gland),
         },
         values={
-            **solve_report(closed),
+            **closing_report(closed),
             "height_mm": view.height_mm,
             "lift_mm": float(lift[2]),
             "known_lower_mm": lower_mm,
@@ -75,7 +86,22 @@ def _compression(mesh: BlockMesh, view: ViewGeometry, mechanics: Mechanics) -> f
     return max(0.0, 1.0 - view.thickness_mm / (high - low))
 
 
-def solve_report(closed: Closed) -> dict[str, Value]:
+def _force_n(pose: Artefact) -> float:
+    """Force that a view's header or table gives.
+
+    Raises:
+        DataError: neither does.
+    """
+    force = pose.value("header_force_n") if pose.has("header_force_n") else None
+    if force is None:
+        raise DataError(
+            "the plates are to stop at a force, but this view has none; give force_n in the views table, or set "
+            "compress.stop to thickness"
+        )
+    return float(force)
+
+
+def closing_report(closed: Closed) -> dict[str, Value]:
     """What happened in a compression."""
     lower, upper = closed.force_n
     return {
@@ -83,14 +109,10 @@ def solve_report(closed: Closed) -> dict[str, Value]:
         "force_n": 0.5 * (lower + upper),
         "force_lower_n": lower,
         "force_upper_n": upper,
-        "iterations": closed.iterations,
-        "load_steps": closed.steps,
         "cut_steps": closed.cuts,
         "last_motion_mm": closed.restless_mm,
-        "min_det_f": closed.min_det_f,
-        "volume_change": closed.volume_change,
         "penetration_mm": closed.penetration_mm,
-        "energy_mj": closed.energy_mj,
+        **report_values(closed.report),
     }
 
 

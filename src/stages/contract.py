@@ -1,5 +1,6 @@
 """What a stage is: a name, its inputs, a settings model and one function from these to fields."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,7 +28,12 @@ __all__ = [
 class SettingsModel(BaseModel):
     """Base of every stage's settings: unknown keys are errors, and nothing changes after validation."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # Infinity becomes a text that is read back: JSON has no such number.
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="strings")
+
+    def plain(self) -> dict[str, Any]:
+        """The settings in JSON types, as artefacts keep them."""
+        return dict(json.loads(self.model_dump_json()))
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from mammoreg.fem.boundary import BackCondition, back_condition
+from mammoreg.fem.closing import Moving
+from mammoreg.fem.gravity import Gravity, gravity
 from mammoreg.fem.membrane import SKIN_THICKNESS_MM
 from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.parts import Part
 from mammoreg.fem.skin import SkinModel, SkinName, skin_model
 from mammoreg.fem.skin_law import SKIN_MODULUS_KPA, TensionLinear
 from mammoreg.geometry import breast_to_plate
@@ -18,6 +21,7 @@ from stages.contract import SettingsModel
 from stages.tissue import MaterialName, Tissue, catalogue_tissue, neo_hookean_tissue
 
 Floats = NDArray[np.float64]
+_INFERIOR, _ANTERIOR = np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0])
 
 
 class Mechanics(SettingsModel):
@@ -61,8 +65,13 @@ class Mechanics(SettingsModel):
     friction: float = Field(
         0.46,
         ge=0.0,
-        le=2.0,
-        description="friction between skin and plates; 0.46 +- 0.15 in vivo (Zhang and Mak, Prosthet Orthot Int 1999)",
+        description="friction between skin and plates; 0.46 +- 0.15 in vivo (Zhang and Mak, Prosthet Orthot Int 1999); "
+        ".inf: skin that touches sticks",
+    )
+    moving: Moving = Field(
+        "both",
+        description="plates that move; with one of them the back, which stays, bears the difference of the plates' "
+        "forces. Where a second volume shows the plates they end there whichever move",
     )
     lip_radius_mm: float = Field(8.0, ge=1.0, le=30.0, description="radius of the plates' chest-wall lips, mm")
     plates_end: bool = Field(
@@ -80,6 +89,13 @@ class Mechanics(SettingsModel):
         le=1000.0,
         description="soft tissue between the model's back and the chest wall, which shears as the back slides, mm",
     )
+
+    gravity: Literal["none", "standing"] = Field(
+        "none",
+        description="standing: while the plates close, the weight changes from that of a prone patient, which the MR "
+        "volume shows, to that of one who stands",
+    )
+    density_kg_m3: float = Field(1000.0, gt=0.0, le=2000.0, description="density of tissue for its weight, kg/m3")
 
     @property
     def tells_gland_from_fat(self) -> bool:
@@ -104,12 +120,14 @@ class PlacedBreast:
         model: elements and material.
         back: condition of its back.
         skin: what its skin adds, and the faces that meet the plates.
+        loads: its weight, where it counts.
         stiffening: shear modulus at the compression to come over the initial one.
     """
 
     model: HyperelasticModel
     back: BackCondition
     skin: SkinModel
+    loads: tuple[Part, ...] = ()
     stiffening: float = 1.0
 
 
@@ -143,7 +161,14 @@ def place_breast(
     back = back_condition(mechanics.back, points, mesh.back_quads(), shear, along_kpa_per_mm=shear)
     law = TensionLinear(mechanics.skin_modulus_kpa)
     skin = skin_model(mechanics.skin, model, mesh.skin_quads(), law, mechanics.skin_thickness_mm)
-    return PlacedBreast(model, back, skin, tissue.stiffening)
+    loads = (_standing_up(model, mechanics.density_kg_m3, angle_deg),) if mechanics.gravity == "standing" else ()
+    return PlacedBreast(model, back, skin, loads, tissue.stiffening)
+
+
+def _standing_up(model: HyperelasticModel, density_kg_m3: float, angle_deg: float) -> Gravity:
+    """Weight of a standing patient less that of a prone one: two loads of equal size, as one."""
+    change = breast_to_plate(_INFERIOR - _ANTERIOR, angle_deg)
+    return gravity(model, density_kg_m3 * float(np.linalg.norm(change)), change)
 
 
 def _tissue(mechanics: Mechanics, mu_kpa: float, gland: Floats | None, compression: float) -> Tissue:

@@ -4,9 +4,10 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.fem.equilibrium import NewtonOptions
-from mammoreg.fem.prescribed import PrescribedOptions, PrescribedResult, solve_prescribed
+from mammoreg.fem.prescribed import PrescribedOptions, solve_prescribed
 from stages.closing import placed_again
-from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject
+from stages.solving import report_values, seconds_text
 
 
 class Settings(SettingsModel):
@@ -29,28 +30,19 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         breast.back,
         start=shape.array("deformed", "mm") - lift,
         pressure=shape.array("pressure", "kPa"),
+        parts=breast.loads,
         options=PrescribedOptions(newton=NewtonOptions(residual=settings.residual, increment_mm=settings.increment_mm)),
     )
+    print(seconds_text(solved.report), flush=True)
     return Fields(
         arrays={"deformed": Array(solved.deformed + lift, "mm", "mesh nodes under the estimated surface, plate frame")},
         values={
-            **_report(solved),
+            **report_values(solved.report),
+            "residuals": [float(r) for r in solved.residuals],
             "thickness_mm": compress.value("thickness_mm"),
             "force_n": compress.value("force_n"),
         },
     )
 
 
-def _report(solved: PrescribedResult) -> dict[str, Value]:
-    return {
-        "iterations": solved.iterations,
-        "load_steps": solved.steps,
-        "cut_steps": solved.cuts,
-        "residuals": [float(r) for r in solved.residuals],
-        "min_det_f": solved.min_det_f,
-        "volume_change": solved.volume_change,
-        "energy_mj": solved.energy_mj,
-    }
-
-
-STAGE = Stage(name="solve", schema=1, inputs=("mesh", "compress", "shape"), settings=Settings, run=run)
+STAGE = Stage(name="solve", schema=2, inputs=("mesh", "compress", "shape"), settings=Settings, run=run)

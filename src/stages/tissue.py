@@ -24,7 +24,7 @@ class Tissue:
     Attributes:
         material: of the elements, without fibres.
         mu_kpa: shear modulus of the whole at the compression to come: the neo-Hookean one of the same stress.
-        stiffening: that over the initial one.
+        stiffening: slope of the stress there over the initial one.
     """
 
     material: ElasticMaterial
@@ -69,7 +69,8 @@ def catalogue_tissue(name: str, poisson: float, gland: Floats | None, compressio
     bulk = shares @ np.array([max(tangent_bulk_kpa(law, e, poisson) for e in (0.0, compression)) for law in laws])
     mixture = TissueMixture(laws, shares)
     mu = float((shares @ np.array([_stress_mu_kpa(law, compression) for law in laws])).mean())
-    return Tissue(hyperelastic(mixture, poisson, bulk), mu, mu / float(mixture.mu_kpa.mean()))
+    material = hyperelastic(mixture, poisson, bulk)
+    return Tissue(material, mu, float(material.reached_mu_kpa(compression).mean() / material.mu_kpa.mean()))
 
 
 def _stress_mu_kpa(law: Law, compression: float) -> float:

@@ -103,7 +103,8 @@ def test_friction_holds_the_skin_back(inputs, tmp_path):
     assert held.sum() >= 5
     assert motion[rough].mean() < 0.9 * motion[slippery].mean()
     assert rough.value("force_n") > slippery.value("force_n")
-    assert np.abs(slippery.array("contact/traction", "kPa")).max() == 0.0
+    assert [f"contact/{name}" in rough.names() for name in ("anchor", "traction", "pressure")] == [True] * 3
+    assert not [name for name in slippery.names() if name.startswith("contact/")], "no friction, no memory of it"
 
 
 def test_fibres_along_the_nipple_axis_shorten_the_reach(inputs, tmp_path):
@@ -141,7 +142,7 @@ def test_the_paper_s_tissues_are_pressed_with_the_same_plates(inputs, segment, p
     assert abs(got.value("volume_change")) < 0.01
     assert got.value("min_det_f") > 0.2
     assert 0.2 < got.value("compression") < 0.6
-    stiffer = {"wellman": got.value("stiffening") > 2.0, "bakic": 0.5 < got.value("stiffening") < 1.0}
+    stiffer = {"wellman": got.value("stiffening") > 2.0, "bakic": 0.9 < got.value("stiffening") < 1.1}
     assert stiffer[material]
     heights = _nodes(got)[_nodes(got)[:, 1] < EDGE - 8.0, 2] - got.value("height_mm")
     assert heights.min() > -1.0
@@ -160,7 +161,7 @@ def test_resumed_closing_is_what_compress_left(inputs, plain):
     closing, closed = resumed(artefacts["mesh"], plain, EDGE)
     lift = np.array([0.0, 0.0, plain.value("lift_mm")])
     np.testing.assert_allclose(closed.deformed + lift, _nodes(plain), atol=1e-12)
-    idle = PlaneTies(MESH.skin_quads()[:1], np.full((1, 4), 0.25), np.eye(3)[:1], np.zeros(1), np.zeros(1))
+    idle = _idle()
     again = closing.rest(closed, idle, 0.05)
     assert np.abs(again.deformed - closed.deformed).max() < 0.15
     assert again.force_n == pytest.approx(closed.force_n, rel=0.02)
@@ -181,3 +182,71 @@ def test_case_with_a_compression_alone_is_pressed(tmp_path):
     got = run("compress", tmp_path / "out", chain, view="3D")
     assert got.ok, got.message
     assert got.value("thickness_mm") < 0.8 * np.ptp(MESH.points[:, 2])
+
+
+def test_report_of_the_solve_is_kept_without_its_times(inputs, plain, tmp_path):
+    assert plain.value("unbalance") < 0.02
+    assert plain.value("energy_mj") > 10.0 * plain.value("volumetric_energy_mj") > 0.0
+    assert set(plain.value("part_energies_mj")) == {"BackSprings"}
+    assert plain.value("iterations") == len(plain.array("residuals", "1"))
+    assert not [name for name in plain.value_names() if "second" in name or "wall" in name]
+    assert run("compress", tmp_path, inputs).path.read_bytes() == plain.path.read_bytes()
+
+
+def test_plates_stop_at_the_header_s_force(inputs, plain, tmp_path):
+    pose = write_pose(tmp_path / "p.h5", header_force_n=0.5 * plain.value("force_n"))
+    got = run("compress", tmp_path / "out", inputs | {"pose": pose}, {"stop": "force"})
+    assert got.ok, got.message
+    assert got.value("force_n") == pytest.approx(0.5 * plain.value("force_n"), rel=0.01)
+    assert plain.value("thickness_mm") + 2.0 < got.value("thickness_mm") < got.value("uncompressed_mm")
+    unknown = run("compress", tmp_path / "out", inputs, {"stop": "force"})
+    assert unknown.status == "failed"
+    assert "give force_n in the views table, or set compress.stop to thickness" in unknown.message
+
+
+def test_skin_sticks_where_friction_has_no_limit(inputs, plain, tmp_path):
+    stuck = _with(inputs, tmp_path, friction=float("inf"))
+    assert stuck.value("mechanics")["friction"] == "Infinity"
+    assert stuck.value("force_n") > plain.value("force_n")
+    closing, closed = resumed(Artefact(inputs["mesh"]), stuck, EDGE)
+    assert closing.contact.sticks
+    assert closed.force_n[0] == stuck.value("force_lower_n")
+
+
+def test_one_plate_moves(inputs, plain, tmp_path):
+    """The lower plate stays where it has first touched; the back's springs bear the difference of the forces."""
+    upper = _with(inputs, tmp_path, moving="upper")
+    assert upper.value("thickness_mm") == plain.value("thickness_mm")
+    assert upper.value("force_lower_n") != pytest.approx(upper.value("force_upper_n"), rel=0.02)
+    back = [breast_to_plate(MESH.points, ANGLE)[MESH.back_nodes(), 2], _nodes(upper)[MESH.back_nodes(), 2]]
+    sunk = np.mean(back[1] - upper.value("lift_mm") - back[0])
+    assert sunk < -1.0, "the middle between the plates goes down"
+
+
+def test_standing_up_lets_the_breast_fall_back_and_down(inputs, plain, tmp_path):
+    heavy = _with(inputs, tmp_path, gravity="standing")
+    assert set(heavy.value("part_energies_mj")) == {"BackSprings", "Gravity"}
+    moved = _nodes(heavy) - _nodes(plain)
+    assert moved[:, 1].mean() > 0.1, "what hung forwards comes back"
+    light = _with(inputs, tmp_path, gravity="standing", density_kg_m3=100.0)
+    less = _nodes(light) - _nodes(plain)
+    assert less[:, 1].mean() == pytest.approx(0.1 * moved[:, 1].mean(), rel=0.5)
+
+
+@pytest.mark.parametrize("skin", ["attached", "sliding", "adherent"])
+def test_skin_holds_the_breast_together(inputs, plain, tmp_path, skin):
+    """Stiff skin needs more force; `resumed` knows it again."""
+    tight = _with(inputs, tmp_path, skin=skin, skin_modulus_kpa=100.0)
+    assert tight.value("force_n") > 1.02 * plain.value("force_n")
+    assert tight.value("part_energies_mj")["Membrane"] > 0.0
+    assert ("membrane" in tight.names()) is (skin != "attached")
+    closing, closed = resumed(Artefact(inputs["mesh"]), tight, EDGE)
+    np.testing.assert_allclose(closed.deformed[:, 2] + tight.value("lift_mm"), _nodes(tight)[:, 2], atol=1e-9)
+    again = closing.rest(closed, _idle(), 0.05)
+    assert np.abs(again.deformed - closed.deformed).max() < 0.3
+    assert again.force_n == pytest.approx(closed.force_n, rel=0.03)
+
+
+def _idle():
+    """A tie without stiffness."""
+    return PlaneTies(MESH.skin_quads()[:1], np.full((1, 4), 0.25), np.eye(3)[:1], np.zeros(1), np.zeros(1))

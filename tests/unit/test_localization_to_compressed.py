@@ -58,3 +58,16 @@ def test_outline_fit_recovers_a_turn() -> None:
     placed = fit_surface_to_outline(points, signed_distance(ellipsoid_mask(radii, shift, turn)), rotate=True)
     inner = 0.5 * points
     assert np.linalg.norm(placed.forward(inner) - (inner @ turn.T + shift), axis=1).max() < 1.0
+
+
+def test_slopes_over_a_wide_base_find_one_place_from_everywhere() -> None:
+    """Near the same surface, and whatever the start, which the kinks of the voxels' distances do not hold up."""
+    radii, shift = (60.0, 70.0, 40.0), np.array([2.0, -3.0, 4.0])
+    outline = signed_distance(ellipsoid_mask(radii, shift, np.eye(3)))
+    points = skin_points((60.5, 68.0, 41.0))
+    starts = [np.zeros(3), np.array([1.3, -0.7, 0.9]), np.array([-0.8, 1.1, -1.2])]
+    found = [fit_surface_to_outline(points + s, outline, rotate=False, base_mm=1.0) for s in starts]
+    inner = 0.5 * points
+    places = [fit.forward(inner + s) for fit, s in zip(found, starts, strict=True)]
+    assert max(np.linalg.norm(p - places[0], axis=1).max() for p in places) < 0.05
+    np.testing.assert_allclose((places[0] - inner).mean(axis=0)[[0, 2]], shift[[0, 2]], atol=0.4)

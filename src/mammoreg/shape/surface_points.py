@@ -1,10 +1,9 @@
-"""Ties that draw points of the skin to where they are known to lie (paper, section II-C, Table III, additional points)."""
+"""Points on the skin as points of its faces (paper, section II-C: additional surface points)."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mammoreg.fem.ties import PlaneTies
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import skin_facets
 
@@ -28,24 +27,3 @@ def nearest_on_skin(
     rows = facets.interpolation[found]
     shares = np.stack([np.asarray(rows[np.arange(len(points)), corners[:, c]]).ravel() for c in range(4)], axis=-1)
     return corners, shares
-
-
-def point_ties(
-    corners: NDArray[np.int64], shares: NDArray[np.float64], targets: Points, stiffness: float
-) -> PlaneTies:
-    """Three springs a point, along the axes.
-
-    Args:
-        corners, shares: of `nearest_on_skin`.
-        targets: places (P, 3), mm.
-        stiffness: spring constant, mN/mm.
-    """
-    count = len(targets)
-    direction = np.tile(np.eye(3), (count, 1))
-    return PlaneTies(
-        np.repeat(corners, 3, axis=0),
-        np.repeat(shares, 3, axis=0),
-        direction,
-        np.asarray(targets, dtype=float).ravel(),
-        np.full(3 * count, stiffness),
-    )

@@ -26,10 +26,12 @@ class SecondVolume:
     Attributes:
         mask: the body between the plates.
         skin: points (N, 3) on the undeformed skin.
+        base_mm: of `fit_surface_to_outline`, for the shift.
     """
 
     mask: Volume
     skin: Points
+    base_mm: float | None = None
 
     @cached_property
     def outline(self) -> Volume:
@@ -47,7 +49,7 @@ class SecondVolume:
     def shift(self, way: MethodView, drawn_mm: Sequence[float]) -> Points:
         """Displacement (3,) by which the mask places what a method has deformed."""
         surface = drawn_to_breast(way, drawn_mm, self.skin)
-        return fit_surface_to_outline(surface, self.outline, rotate=False).offset
+        return fit_surface_to_outline(surface, self.outline, rotate=False, base_mm=self.base_mm).offset
 
 
 def second_volume(segment: Artefact, block: BlockMesh) -> SecondVolume | None:

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from mammoreg.fem.closing import Closed
+from mammoreg.fem.point_ties import point_ties
 from mammoreg.geometry import breast_to_plate, lps_to_breast
 from mammoreg.geometry.frames import Points
-from mammoreg.shape.surface_points import nearest_on_skin, point_ties
+from mammoreg.shape.surface_points import nearest_on_skin
 from stages.artefact import Artefact
 from stages.closing import resumed
 from stages.contract import Inputs
@@ -84,9 +85,9 @@ def draw_to_points(
         # The points lie a little off the mesh's skin, and stay so.
         off = way.deformation.forward(start) - skin
         targets = _in_plate_frame(case, closed.deformed + lift, goal) - off - lift
-        ties = point_ties(corners, shares, targets, constant)
+        ties = point_ties(closing.points, corners, shares, targets, constant)
         closed = closing.rest(closed, ties, REST_DAMPING)
-    left = np.linalg.norm(np.einsum("pa,pai->pi", shares, closed.deformed[corners]) - targets, axis=1)
+    left = np.linalg.norm(ties.points(closed.deformed) - targets, axis=1)
     return Drawn(closed.deformed + lift, closed, float(left.mean()))
 
 

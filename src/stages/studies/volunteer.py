@@ -81,7 +81,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             "table_3": _boundaries(inputs, case, settings),
             "table_4": {skin: _compressed(plan, case, plain.model_copy(update={"skin": skin})) for skin in SKINS},
         }
-        values["mechanics"] = {"own": own.model_dump(mode="json"), "plain": plain.model_dump(mode="json")}
+        values["mechanics"] = {"own": own.plain(), "plain": plain.plain()}
     for table, (key, _) in TABLES.items():
         values[f"{table}_rows"] = _rows(key, landmarks, outcomes[table])
     values["runs"] = [row for table, found in outcomes.items() for row in _runs(table, found)]
@@ -124,7 +124,7 @@ def _paper_tissue(plan: Plan, settings: Settings) -> Mechanics:
 
 def _compressed(plan: Plan, case: VolunteerCase, mechanics: Mechanics) -> Outcome:
     """The breast between the plates with other mechanics."""
-    changes = {"compress": {"mechanics": mechanics.model_dump(mode="json")}}
+    changes = {"compress": {"mechanics": mechanics.plain()}}
     with tempfile.TemporaryDirectory() as folder:
         (path,) = run_chain(plan, ("compress",), Path(folder), changes).artefacts["compress"]
         return _outcome(case, Artefact(path))

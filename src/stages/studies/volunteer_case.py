@@ -1,7 +1,7 @@
 """A case with landmarks in two MR volumes: what any deformation of its breast does to them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,9 @@ from stages.evaluating.elongation import elongation_rows
 from stages.localizing.compressed import SecondVolume, drawn_mm, second_volume, view_in_second_volume
 from stages.marks import mr_landmarks
 from stages.methods import block_mesh, view_geometry
+
+BASE_MM = 1.0
+"""Slopes over this base let two variations that differ little be placed alike, to some hundredths of a millimetre."""
 
 
 @dataclass(frozen=True)
@@ -100,4 +103,5 @@ def volunteer_case(inputs: Inputs, landmarks: Landmarks) -> VolunteerCase | str:
         return "no second volume shows the compression"
     if not poses[view].ok:
         return poses[view].message
-    return VolunteerCase(poses[view], block, ReferenceMesh(block.points, block.hexes()), second, landmarks)
+    placing = replace(second, base_mm=BASE_MM)
+    return VolunteerCase(poses[view], block, ReferenceMesh(block.points, block.hexes()), placing, landmarks)
