@@ -53,8 +53,11 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     del found["shape"]
     found["mr_landmarks"] = write_points(folder, "before", LANDMARKS)
     found["mr_compressed_landmarks"] = write_points(folder, "after", truly_pressed(LANDMARKS))
-    found["mr_surface_points"] = write_points(folder, "skin", SKIN)
-    found["mr_compressed_surface_points"] = write_points(folder, "pressed_skin", truly_pressed(SKIN))
+    # One more point lies far off, as on skin that a mesh does not reach.
+    found["mr_surface_points"] = write_points(folder, "skin", np.vstack([SKIN, [0.0, 20.0, 90.0]]))
+    found["mr_compressed_surface_points"] = write_points(
+        folder, "pressed_skin", np.vstack([truly_pressed(SKIN), [30.0, 20.0, 40.0]])
+    )
     return found
 
 
@@ -125,6 +128,7 @@ def _run_of(artefact: Artefact, table: str, name: str) -> dict[str, Any]:
 
 def test_known_points_draw_the_skin_and_the_landmarks(inputs: dict[str, Path], studied: Artefact) -> None:
     drawn = _run_of(studied, "table_3", "additional_points")
+    assert drawn["points"] == len(SKIN)
     assert drawn["points_left_mm"] < 0.3
     assert 0.0 < drawn["moved_mm"] < 1.5
     found = np.mean(distances(studied, "table_3", "boundary", "additional_points"))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mammoreg.errors import DataError
 from mammoreg.fem.closing import Closed
 from mammoreg.fem.point_ties import point_ties
 from mammoreg.geometry import breast_to_plate, lps_to_breast
@@ -19,6 +20,7 @@ from stages.studies.volunteer_case import VolunteerCase
 
 REST_DAMPING = 0.05
 ROUNDS = 2
+FARTHEST_MM = 4.0  # three voxels of the working grid
 
 
 @dataclass(frozen=True)
@@ -28,11 +30,13 @@ class Drawn:
     Attributes:
         deformed: nodes (N, 3), plate frame, mm.
         closed: the same in its own height, with its report.
-        left_mm: mean distance of the tied points from their targets.
+        points: number of tied points.
+        left_mm: their mean distance from their targets.
     """
 
     deformed: Points
     closed: Closed
+    points: int
     left_mm: float
 
     def report(self) -> dict[str, Any]:
@@ -42,6 +46,7 @@ class Drawn:
         return found | {
             "min_det_f": closed.min_det_f,
             "volume_change": closed.volume_change,
+            "points": self.points,
             "points_left_mm": self.left_mm,
         }
 
@@ -62,7 +67,8 @@ def draw_to_points(
     """Go on from `compress` with points of the skin tied to where the second volume shows them.
 
     Where the model lies in the second volume is known by the fit of its outline, which the ties change; so they are
-    tied twice.
+    tied twice. A point farther from the mesh's skin than `FARTHEST_MM` lies on skin that the mesh does not have, and
+    is left out.
 
     Args:
         case: the volunteer.
@@ -71,6 +77,7 @@ def draw_to_points(
         stiffness: of a point's springs, in units of the shear modulus times the size of a skin face.
 
     Raises:
+        DataError: none of the points lies on the mesh's skin.
         NotConvergedError: with the reason.
     """
     start, goal = points
@@ -78,6 +85,11 @@ def draw_to_points(
     closing, closed = resumed(mesh, compress, case.way(compress.array("deformed", "mm")).geometry.edge_p_mm)
     quads = case.block.skin_quads()
     corners, shares = nearest_on_skin(case.block.points, quads, start)
+    away = np.linalg.norm(np.einsum("pa,pai->pi", shares, case.block.points[corners]) - start, axis=1)
+    near = away < FARTHEST_MM
+    if not near.any():
+        raise DataError(f"no surface point lies within {FARTHEST_MM:g} mm of the mesh's skin; check mr_surface_points")
+    corners, shares, start, goal = corners[near], shares[near], start[near], goal[near]
     constant = stiffness * float(compress.value("mu_kpa")) * _face_mm(case)
     for _ in range(ROUNDS):
         skin = np.einsum("pa,pai->pi", shares, (closed.deformed + lift)[corners])
@@ -88,7 +100,7 @@ def draw_to_points(
         ties = point_ties(closing.points, corners, shares, targets, constant)
         closed = closing.rest(closed, ties, REST_DAMPING)
     left = np.linalg.norm(ties.points(closed.deformed) - targets, axis=1)
-    return Drawn(closed.deformed + lift, closed, float(left.mean()))
+    return Drawn(closed.deformed + lift, closed, len(left), float(left.mean()))
 
 
 def _in_plate_frame(case: VolunteerCase, deformed: Points, goal: Points) -> Points:

@@ -46,6 +46,7 @@ REPORT = {
     "min_det_f": ("smallest det F", 2),
     "volume_change": ("volume change", 4),
     "moved_mm": ("landmarks moved, mm", 2),
+    "points": ("points of the skin tied", 0),
     "points_left_mm": ("points' distance left, mm", 2),
     "lateral_mm": ("lateral elongation, mm", 1),
     "true_lateral_mm": ("true, mm", 1),
@@ -163,10 +164,19 @@ def _report(table: Table, artefact: Artefact) -> Section:
     runs = _runs(table, artefact)
     used = [name for name in REPORT if any(run.get(name) is not None for run in runs)]
     rows = [[run["name"], *(_number(run.get(name), REPORT[name][1]) for name in used)] for run in runs]
-    note = f"Landmarks moved: mean distance from where {REFERENCES[_key(table)]} puts them."
+    note = f"Landmarks moved: mean distance from where {REFERENCES[_key(table)]} puts them.{_furthest(runs)}"
     return Section(
         f"{artefact.case}: solves", [table.keys[0], *(REPORT[name][0].strip() for name in used)], rows, [note]
     )
+
+
+def _furthest(runs: Sequence[Mapping[str, Any]]) -> str:
+    """Which variation matters most."""
+    moved = {run["name"]: run["moved_mm"] for run in runs if run.get("moved_mm") is not None}
+    if not moved:
+        return ""
+    name = max(moved, key=lambda each: moved[each])
+    return f" {name.replace('_', ' ').capitalize()} moves them furthest, by {moved[name]:.2f} mm."
 
 
 def _number(value: float | None, decimals: int) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from mammoreg.errors import NotConvergedError
+from mammoreg.errors import DataError, NotConvergedError
 from mammoreg.geometry.frames import Points
 from stages.artefact import Artefact, Fields
 from stages.contract import Inputs, SettingsModel, Stage, Subject
@@ -166,7 +166,7 @@ def _drawn(inputs: Inputs, case: VolunteerCase, compress: Artefact | None, setti
         return _outcome(case, compress)
     try:
         drawn = draw_to_points(case, inputs.artefact("mesh"), compress, points, settings.point_stiffness)
-    except NotConvergedError as error:
+    except (DataError, NotConvergedError) as error:
         return Outcome(message=str(error))
     return _measured(case, drawn.deformed, drawn.report())
 
