@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from mammoreg.fem import nested as fem_nested
 from mammoreg.fem.closing import ClosingOptions
 from mammoreg.fem.nested import close_nested, coarsened, nested_sizes
+from mammoreg.fem.unfold import unfolded
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.breast_block import HEIGHT_MM, UNDAMPED, breast_block, breast_closing
 
@@ -30,12 +32,30 @@ def test_a_few_iterations_remain_on_the_fine_mesh(percent: int) -> None:
     assert nested[-1].iterations < 0.6 * direct.iterations
 
 
-def test_start_that_would_turn_elements_inside_out_is_made_at_a_wider_gap() -> None:
+@pytest.mark.parametrize(("healing", "steps"), [(True, 1), (False, 2)])
+def test_start_that_turns_elements_over_is_healed_or_made_at_a_wider_gap(
+    healing: bool, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not healing:
+        monkeypatch.setattr(fem_nested, "unfolded", lambda _model, positions, _held, _least: positions)
     gap = 0.5 * HEIGHT_MM
     nested, direct = close_nested(breast_closing(12), gap), breast_closing(12).close(gap)
-    assert nested[-1].steps == 2
+    assert nested[-1].steps == steps
     assert nested[-1].iterations == len(nested[-1].residuals) < direct.iterations
     assert np.abs(nested[-1].deformed - direct.deformed).max() < UNDAMPED.tolerance_mm
+
+
+def test_displacements_that_turn_elements_over_are_healed_around_them() -> None:
+    model = breast_closing(6).model
+    positions = model.points * [1.2, 1.2, 0.7]
+    wanted = positions.copy()
+    positions[171] += [40.0, 0.0, 0.0]  # the middle
+    assert model.determinants(positions).min() < 0.0
+    held = np.zeros(positions.shape, dtype=bool)
+    healed = unfolded(model, positions, held, 0.1)
+    assert model.determinants(healed).min() > 0.1
+    np.testing.assert_allclose(healed, wanted, atol=1e-9)  # small strains keep what is affine around them
+    np.testing.assert_array_equal(unfolded(model, wanted, held, 0.1), wanted)
 
 
 def test_heterogeneous_breast_with_friction_between_ending_plates() -> None:

@@ -59,7 +59,7 @@ def test_subdivided_breast_is_pressed_with_the_force_of_febio(compression: float
     coarse, fine = close_nested(breast(14).closing(), 110.0 * (1.0 - compression))
     assert coarse.force_n[0] == pytest.approx(FORCES_N[compression], rel=0.005)
     assert fine.force_n[0] == pytest.approx({0.21: 15.272, 0.5: 108.555}[compression], rel=0.005)
-    assert fine.iterations <= 6
+    assert fine.iterations <= 10
 
 
 def test_calculix_locks_on_the_same_breast() -> None:

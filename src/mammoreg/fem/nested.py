@@ -13,12 +13,14 @@ from mammoreg.fem.closing import Closed, Closing
 from mammoreg.fem.damped import DampedState
 from mammoreg.fem.hierarchy import Array, Hierarchy, Integers, block_size, interpolate_elements, interpolation
 from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.unfold import unfolded
 from mammoreg.materials.elastic import ElasticMaterial
 from mammoreg.meshing.block import BlockMesh
 
 COARSEST = 8  # elements a side up to which a mesh is closed on its own
 NEAREST_POINTS = 4
 LEAST_START_DET = 0.02  # an interpolated start that squeezes an element further is not used
+HEALED_DET = 0.1  # what interpolation squeezes further is healed
 WIDER_SHARE = 0.6  # of the plates' way, to start from instead
 
 _log = logging.getLogger(__name__)
@@ -87,7 +89,7 @@ def _closed(coarse: Closing | None, fine: Closing, found: list[Closed], gap_mm: 
 
 
 def _resumed(coarse: Closing, fine: Closing, closed: Closed) -> Closed | None:
-    """A body at rest where the coarser one is; None: its elements would be squeezed too far there."""
+    """A body at rest where the coarser one is; None: its elements would be turned inside out there."""
     start = _carried(closed, coarse, fine)
     if fine.model.determinants(start.positions).min() < LEAST_START_DET:
         return None
@@ -110,10 +112,11 @@ def _carried(closed: Closed, coarse: Closing, fine: Closing) -> DampedState:
     many, few = (block_size(closing.model.hexes) for closing in (fine, coarse))
     assert many is not None
     assert few is not None
-    positions = fine.points + interpolation(many, few) @ (closed.deformed - coarse.points)
-    positions[fine.back.nodes] = np.where(
-        fine.back.held, fine.points[fine.back.nodes] + fine.back.pull_mm, positions[fine.back.nodes]
-    )
+    moved = fine.points + interpolation(many, few) @ (closed.deformed - coarse.points)
+    held, anchors = np.zeros(moved.shape, dtype=bool), fine.points.copy()
+    held[fine.back.nodes] = fine.back.held
+    anchors[fine.back.nodes] += fine.back.pull_mm
+    positions = unfolded(fine.model, np.where(held, anchors, moved), held, HEALED_DET)
     pressure = interpolate_elements(closed.state.pressure, many, few)
     return DampedState(positions, pressure, closed.state.height, _carried_memory(closed, coarse, fine, positions))
 
