@@ -166,7 +166,7 @@ class Closing:
         """
         resting = self._resting(self.equilibrium(), gap_mm, Way(state, gap_mm, 1))
         eased = resting.eased(resting.stiff, state, self.options.damping)
-        return resting.rested(resting.stiff, eased, STIFF_DAMPING * self.options.damping)
+        return resting.rested(eased, STIFF_DAMPING * self.options.damping)
 
     def further(self, closed: Closed, gap_mm: float) -> Closed:
         """Go on from a closed state, which was not tied to an outline, to a narrower gap in one step.
@@ -189,7 +189,7 @@ class Closing:
         resting = self._resting(self.equilibrium(outline), closed.gap_mm, way)
         # Easing the contact first would unload the friction that the closing has built up.
         try:
-            return resting.rested(resting.stiff, state, damping)
+            return resting.rested(state, damping)
         except NotConvergedError:
             return resting.settled(state, damping)
 
@@ -279,7 +279,7 @@ class Closing:
         if soft:
             return resting.settled(self._advance(equilibrium, way, gap, 1.0), self.options.damping)
         stiff = self._advance(resting.stiff, way, gap, 1.0)
-        return resting.rested(resting.stiff, stiff, STIFF_DAMPING * self.options.damping)
+        return resting.rested(stiff, STIFF_DAMPING * self.options.damping)
 
 
 def _log_force(closed: Closed) -> float:

@@ -13,6 +13,12 @@ STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share o
 REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
 HARDER = 10.0  # a step that fails is tried again with this much more damping
 PATIENCE = 4  # a breast that does not rest yet gets so many times the steps
+DEEP, HARDENINGS, HARDER_CONTACT = (
+    0.05,
+    4,
+    3.0,
+)  # skin deeper in the plates, as a share of their gap, hardens them so many times at most
+LARGEST_PENETRATION = 0.2  # of the gap: no longer a breast between plates
 RESTLESS_MM = 1.0  # a breast that still moves further in its last step has not come to rest
 
 
@@ -54,12 +60,13 @@ class Resting:
             for factor in self.options.stiffening:
                 eased = self.eased(contact, eased, damping)
                 contact = self.equilibrium.with_contact(self.equilibrium.contact.stiffened(factor))
-            return self.rested(self.stiff, eased, STIFF_DAMPING * damping)
+            closed = self._rested(self.stiff, eased, STIFF_DAMPING * damping)
         except NotConvergedError:
             if not self.options.stiffening:
                 raise
-        self.cuts += 1
-        return self.rested(self.equilibrium, _unshifted(state), damping)
+            self.cuts += 1
+            return self._between(self._rested(self.equilibrium, _unshifted(state), damping))
+        return self._between(self._hardened(closed, damping))
 
     def eased(self, contact: DampedEquilibrium, state: DampedState, damping: float) -> DampedState:
         """One step in a contact, damped harder where it fails."""
@@ -70,12 +77,43 @@ class Resting:
                 continue
         return contact.step(state, self.load, HARDER**2 * damping, self.options.tolerance_mm)
 
-    def rested(self, contact: DampedEquilibrium, state: DampedState, damping: float) -> Closed:
-        """Steps in a contact with less and less damping until nothing moves.
+    def rested(self, state: DampedState, damping: float) -> Closed:
+        """Steps in the stiffest contact with less and less damping until nothing moves.
 
         Raises:
             NotConvergedError: it does not come to rest.
         """
+        return self._between(self._rested(self.stiff, state, damping))
+
+    def _hardened(self, closed: Closed, damping: float) -> Closed:
+        """At rest in contacts stiffer still, as tissue needs that has become stiffer by far than it was at first."""
+        factor = self.options.stiffest
+        for _ in range(HARDENINGS if self.options.stiffening else 0):
+            if self.stiff.penetration_mm(closed.state, self.load.plates) <= DEEP * self.gap_mm:
+                break
+            factor *= HARDER_CONTACT
+            contact = self.equilibrium.with_contact(self.equilibrium.contact.stiffened(factor))
+            try:
+                eased = self.eased(contact, _unshifted(closed.state), damping)
+                closed = self._rested(contact, eased, STIFF_DAMPING * damping)
+            except NotConvergedError:
+                self.cuts += 1
+                break
+        return closed
+
+    def _between(self, closed: Closed) -> Closed:
+        """The result, if it is a breast between plates.
+
+        Raises:
+            NotConvergedError: it is not.
+        """
+        passed = self.stiff.penetration_mm(closed.state, self.load.plates)
+        if passed > LARGEST_PENETRATION * self.gap_mm:
+            raise NotConvergedError(f"the skin passes the plates by {passed:.1f} mm at a gap of {self.gap_mm:.1f} mm")
+        return closed
+
+    def _rested(self, contact: DampedEquilibrium, state: DampedState, damping: float) -> Closed:
+        """Steps in a contact with less and less damping until nothing moves."""
         tolerance, moved, factor = self.options.tolerance_mm, np.inf, damping
         for rest in range(PATIENCE * self.options.rests):
             if rest >= self.options.rests and moved <= RESTLESS_MM:
@@ -102,7 +140,10 @@ class Resting:
             if contact.penetration_mm(state, plates) <= self.options.penetration_mm:
                 break
             memory = contact.contact.augmented(state.positions, plates, state.height, state.memory)
-            state = contact.step(replace(state, memory=memory), self.load, damping, self.options.tolerance_mm)
+            try:
+                state = contact.step(replace(state, memory=memory), self.load, damping, self.options.tolerance_mm)
+            except NotConvergedError:
+                break  # the state before is an equilibrium too, and says how deep the skin lies
         return state
 
 
