@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import ViewGeometry, breast_to_plate, lps_to_breast
+from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate, lps_to_breast
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.mammogram import Exposure, Pectoral, presented, project
 from mammoreg.phantom.mri import T1, T1_FAT_SUPPRESSED, Acquisition, acquire
@@ -15,12 +15,12 @@ from mammoreg.phantom.shape import Array as Points
 from mammoreg.phantom.skin_points import skin_points
 from mammoreg.phantom.warp import Deformed
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.digital_files import mammogram_dicom, mask_png, nifti, points_tsv
+from stages.digital_files import mammogram_dicom, mask_png, mr_dicom, nifti, points_tsv
 
-MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1000, 700
+MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1300, 900
 SOURCE_DETECTOR_MM, SUPPORT_DETECTOR_MM = 650.0, 15.0
 OFF_CENTRE_MM = 8.0
-HEADER_THICKNESS_OFF_MM = 1.2
+HEADER_THICKNESS_OFF_MM = 2.0
 LANDMARKS, VOLUNTEER_LANDMARKS, SURFACE_POINTS = 30, 17, 16
 EXPOSURE = Exposure(photons=4.0e4, scatter=0.35, scatter_mm=10.0, blur_mm=0.15, equalisation=0.6)
 NOISE, FAT_SUPPRESSED_NOISE, BIAS = 22.0, 14.0, 0.5
@@ -35,6 +35,9 @@ class DigitalPatient(SettingsModel):
     )
     fat_suppressed: bool = Field(False, description="Whether the MR volume is fat-suppressed.")
     both_breasts: bool = Field(False, description="Whether the MR volume shows both breasts.")
+    mr_form: Literal["nifti", "sagittal_nifti", "dicom"] = Field(
+        "nifti", description="Form of the MR volume: NIfTI, NIfTI of sagittal planes, or a folder with a DICOM series."
+    )
     monochrome1: bool = Field(False, description="Whether the mammograms are stored inverted (MONOCHROME1).")
     unseen_views: tuple[Literal["CC", "MLO"], ...] = Field((), description="Views without a visible lesion.")
 
@@ -44,9 +47,13 @@ class Settings(SettingsModel):
 
     patients: dict[str, DigitalPatient] = Field(
         default={
-            "clinical1": DigitalPatient(seed=20261, both_breasts=True),
-            "clinical2": DigitalPatient(seed=20262, fat_suppressed=True, monochrome1=True, unseen_views=("MLO",)),
-            "volunteer1": DigitalPatient(seed=20264, kind="volunteer"),
+            "clinical1": DigitalPatient(seed=20271, both_breasts=True),
+            "clinical2": DigitalPatient(seed=20272, fat_suppressed=True, monochrome1=True, unseen_views=("MLO",)),
+            "clinical3": DigitalPatient(seed=20273, mr_form="dicom"),
+            "clinical4": DigitalPatient(seed=20274, mr_form="sagittal_nifti"),
+            "clinical5": DigitalPatient(seed=20275, fat_suppressed=True),
+            "clinical6": DigitalPatient(seed=20276),
+            "volunteer1": DigitalPatient(seed=20277, kind="volunteer"),
         },
         description="Patients by case.",
     )
@@ -60,6 +67,14 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     if chosen.kind == "volunteer":
         return Making(subject, chosen, Patient.draw(chosen.seed, ("3D",), True, VOLUNTEER_LANDMARKS)).volunteer()
     return Making(subject, chosen, Patient.draw(chosen.seed, ("CC", "MLO"), False, LANDMARKS)).clinical()
+
+
+def mr_files(volume: Volume, chosen: DigitalPatient, subject: Subject) -> dict[str, bytes]:
+    """A breast-frame MR volume in the patient's form, by file name."""
+    if chosen.mr_form == "dicom":
+        slices = mr_dicom(volume, subject)
+        return {f"mr/{number:03d}.dcm": content for number, content in enumerate(slices, 1)}
+    return {"mr.nii.gz": nifti(volume, subject.laterality, sagittal=chosen.mr_form == "sagittal_nifti")}
 
 
 class Making:
@@ -82,7 +97,9 @@ class Making:
         grid = self.patient.mr_grid(MR_MM, self.chosen.both_breasts)
         centres = grid.centres(np.ones(grid.shape, dtype=bool))
         mask = (lesion.share(centres) > 0.5).reshape(grid.shape)
-        self.files["mr_lesion.nii.gz"] = nifti(grid.with_data(mask.astype(np.uint8)), self.subject.laterality)
+        sagittal = self.chosen.mr_form == "sagittal_nifti"
+        volume = grid.with_data(mask.astype(np.uint8))
+        self.files["mr_lesion.nii.gz"] = nifti(volume, self.subject.laterality, sagittal)
         self._note("lesion_centre", lesion.centre[None], "mm", "centre of the lesion, undeformed")
         for number, view in enumerate(self.patient.placements):
             self._mammogram(view, number)
@@ -108,7 +125,7 @@ class Making:
         patient = self.patient
         grid = patient.mr_grid(MR_MM, self.chosen.both_breasts)
         data = acquire(grid, patient.tissue_of_both_sides, self.acquisition, patient.stream(1))
-        self.files["mr.nii.gz"] = nifti(grid.with_data(data), self.subject.laterality)
+        self.files |= mr_files(grid.with_data(data), self.chosen, self.subject)
         self._points_file("mr_landmarks.tsv", self.names, patient.landmarks)
         self._note("nipple", patient.shape.nipple[None], "mm", "tip of the nipple, undeformed")
         self._note("nodes", patient.mesh.points, "mm", "nodes of the truth's mesh, undeformed")
@@ -161,8 +178,11 @@ class Making:
             "thickness_mm": pressed.gap_mm,
             "uncompressed_mm": pressed.uncompressed_mm,
             "pull_mm": placement.pull_mm,
+            "lift": placement.lift,
             "force_n": pressed.force_n,
             "min_det_f": pressed.min_det_f,
+            "penetration_mm": pressed.penetration_mm,
+            "volume_change": pressed.volume_change,
             "iterations": pressed.iterations,
         }
         self._note(f"{view}/nodes", deformed.deformed, "mm", "nodes of the truth's mesh between the plates")
@@ -195,4 +215,4 @@ def _around(nodes: Points) -> tuple[Points, Points]:
     return nodes.min(axis=0) - np.array([8.0, 14.0, 8.0]), nodes.max(axis=0) + 8.0
 
 
-STAGE = Stage(name="digital", schema=1, inputs=(), settings=Settings, run=run, folder=".")
+STAGE = Stage(name="digital", schema=2, inputs=(), settings=Settings, run=run, folder=".")

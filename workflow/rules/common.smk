@@ -109,7 +109,7 @@ def artefacts_of(stage, case=None, view=None):
 
 
 def files_of(case, view=None):
-    """Files of the tables that a case, or one of its views, names; a folder stands for the files in it."""
+    """Files of the tables that a case, or one of its views, names; a user's folder stands for the files in it."""
     files = dict(case_row(case).files())
     for (owner, name), row in COHORT.mammograms.items():
         if owner == case:
@@ -118,8 +118,9 @@ def files_of(case, view=None):
                 for column, p in row.files().items()
                 if view in (None, name)
             }
+    made = MADE.get(case, ())
     return {
-        n: sorted(map(str, p.iterdir())) if p.is_dir() else str(p)
+        n: sorted(map(str, p.iterdir())) if p.is_dir() and p not in made else str(p)
         for n, p in files.items()
     }
 

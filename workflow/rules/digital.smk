@@ -1,4 +1,9 @@
 # The embedded cohort: one rule a patient, whose outputs are the files that config/digital's tables name.
+def made_output(path):
+    """A file, or the folder of a DICOM series."""
+    return str(path) if path.suffix else directory(str(path))
+
+
 for case, files in MADE.items():
 
     rule:
@@ -6,7 +11,7 @@ for case, files in MADE.items():
             f"digital_{case}"
         output:
             str(PROJECT / "results" / "digital" / case / "digital.h5"),
-            *map(str, files),
+            *map(made_output, files),
         log:
             str(PROJECT / "results" / "digital" / "logs" / f"{case}.log"),
         benchmark:

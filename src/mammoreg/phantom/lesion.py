@@ -52,6 +52,7 @@ class LesionRule:
         skin_mm: least distance of its surface from the skin.
         back_mm: least distance of its surface from the surface where the breast is tied to the chest.
         nipple_mm: least distance of its centre from the nipple.
+        aside_mm: least distance of its centre, along medial, from the nipple.
         off_axis: least and largest share of the way from the breast's axis to the skin.
     """
 
@@ -59,6 +60,7 @@ class LesionRule:
     skin_mm: float
     back_mm: float
     nipple_mm: float
+    aside_mm: float
     off_axis: tuple[float, float]
 
     def draw(self, shape: BreastShape, random: Generator) -> Lesion:
@@ -85,6 +87,7 @@ class LesionRule:
             and shape.level(m, p, s) >= radius + self.skin_mm
             and shape.back(m, s) - p >= radius + self.back_mm
             and np.linalg.norm(place - shape.nipple) >= self.nipple_mm
+            and abs(m - shape.nipple[0]) >= self.aside_mm
         )
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mammoreg.geometry import breast_to_plate
+from mammoreg.materials.elastic import ElasticMaterial, neo_hookean
 from mammoreg.meshing.trilinear import shape_functions, volumes
 from mammoreg.phantom.anatomy import Anatomy
 from mammoreg.phantom.mesh import PhantomMesh
@@ -27,6 +29,8 @@ class Mechanics:
         friction: Coulomb coefficient at the plates.
         wall_normal_kpa_per_mm, wall_tangential_kpa_per_mm: stiffness of the chest wall per area.
         lip_radius_mm: rounding of the plates' chest-wall edge.
+        fibre_ratio: stiffness in tension of fibres along the nipple axis over the shear modulus of fat.
+        fibre_stiffening: exponent with which they stiffen.
     """
 
     fat_kpa: float
@@ -38,6 +42,8 @@ class Mechanics:
     wall_normal_kpa_per_mm: float
     wall_tangential_kpa_per_mm: float
     lip_radius_mm: float
+    fibre_ratio: float
+    fibre_stiffening: float
 
 
 @dataclass(frozen=True)
@@ -49,12 +55,23 @@ class Placement:
         edge_p_mm: posterior coordinate of the plates' and the image's chest-wall edge.
         share: share of the uncompressed thickness that the plates take away.
         pull_mm: how far the radiographer pulls the breast forward.
+        lift: how far the plates' middle is moved towards the nipple's height, as a share.
     """
 
     angle_deg: float
     edge_p_mm: float
     share: float
     pull_mm: float
+    lift: float
+
+
+def breast_material(anatomy: Anatomy, mesh: PhantomMesh, mechanics: Mechanics, angle_deg: float) -> ElasticMaterial:
+    """Material of the elements in the plate frame of an angle; fibres follow the bent nipple axis."""
+    centres = mesh.points[mesh.hexes].mean(axis=1)
+    along = breast_to_plate(anatomy.shape.axis_direction(centres[:, 1]), angle_deg)
+    moduli = element_moduli(anatomy, mesh, mechanics)
+    stiffness = mechanics.fibre_ratio * mechanics.fat_kpa
+    return neo_hookean(moduli, mechanics.poisson, along, stiffness, mechanics.fibre_stiffening)
 
 
 def element_moduli(anatomy: Anatomy, mesh: PhantomMesh, mechanics: Mechanics) -> Array:

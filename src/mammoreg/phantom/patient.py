@@ -11,8 +11,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
+from scipy.optimize import brentq
 
 from mammoreg.geometry import Volume, plate_to_breast
+from mammoreg.meshing.trilinear import volumes
 from mammoreg.phantom.anatomy import Anatomy, Layers, Tissue, build_anatomy
 from mammoreg.phantom.compression import Press, Pressed
 from mammoreg.phantom.lesion import Lesion, LesionRule, draw_landmarks
@@ -25,48 +27,51 @@ View = Literal["CC", "MLO", "3D"]
 HEADER_ANGLE_DEG: dict[View, float] = {"CC": 0.0, "MLO": 45.0, "3D": 0.0}
 
 TORSO = {"half_width": (180.0, 200.0), "half_depth": (115.0, 135.0), "tilt": (0.03, 0.12)}
-SIZE = (0.92, 1.25)
-"""Factor on the lengths of `SCALED`: breasts of about 350 to 1000 ml."""
+VOLUME_CM3 = (250.0, 1000.0)
+"""Of the tissue in front of the chest wall; reached by a factor on the lengths of `SCALED`."""
 SCALED = ("length", "lateral", "medial", "inferior", "superior", "drop_m", "drop_s")
 SHAPE = {
-    "centre_m": (-88.0, -78.0),
+    "centre_m": (-90.0, -78.0),
     "centre_s": (-5.0, 5.0),
-    "length": (82.0, 106.0),
-    "lateral": (42.0, 52.0),
-    "medial": (40.0, 48.0),
-    "inferior": (50.0, 62.0),
-    "superior": (58.0, 72.0),
-    "drop_m": (-12.0, -2.0),
-    "drop_s": (-16.0, -4.0),
-    "slope": (0.15, 0.35),
-    "taper": (0.0, 0.10),
-    "roundness": (2.1, 2.6),
-    "bluntness": (2.4, 3.2),
+    "length": (80.0, 112.0),
+    "lateral": (42.0, 54.0),
+    "medial": (38.0, 50.0),
+    "inferior": (46.0, 62.0),
+    "superior": (52.0, 72.0),
+    "drop_m": (-16.0, 0.0),
+    "drop_s": (-20.0, -2.0),
+    "slope": (0.10, 0.40),
+    "taper": (0.0, 0.20),
+    "roundness": (2.0, 2.6),
+    "bluntness": (2.2, 3.2),
     "blend": (16.0, 24.0),
     "nipple_radius": (4.0, 5.5),
-    "nipple_height": (4.0, 7.0),
+    "nipple_height": (6.0, 9.0),
     "back_lift": (7.0, 10.0),
 }
 LAYERS = {"skin": (1.3, 1.8), "fat": (12.0, 18.0), "muscle": (8.0, 13.0), "ribs": (8.0, 10.0)}
 GLAND_SHARE = (0.12, 0.26)
 MECHANICS = {
-    "fat_kpa": (3.5, 5.0),
+    "fat_kpa": (2.4, 3.6),
     "gland_ratio": (3.0, 5.0),
     "lesion_ratio": (6.0, 10.0),
     "skin_ratio": (9.0, 12.0),
     "poisson": (0.495, 0.497),
     "friction": (0.10, 0.25),
     "wall_normal_kpa_per_mm": (4.0, 8.0),
-    "wall_tangential_kpa_per_mm": (0.6, 1.5),
-    "lip_radius_mm": (14.0, 18.0),
+    "wall_tangential_kpa_per_mm": (0.3, 1.0),
+    "lip_radius_mm": (10.0, 14.0),
+    "fibre_ratio": (1.0, 3.0),
+    "fibre_stiffening": (1.0, 4.0),
 }
-ROLL_DEG = (5.0, 9.0)
+ROLL_DEG = (5.0, 8.0)
 EDGE_MM = (6.0, 12.0)
-PULL_MM = (3.0, 8.0)
-SHARE: dict[View, tuple[float, float]] = {"CC": (0.40, 0.46), "MLO": (0.36, 0.42), "3D": (0.21, 0.21)}
-LESION = LesionRule(diameter_mm=(9.0, 18.0), skin_mm=7.0, back_mm=12.0, nipple_mm=42.0, off_axis=(0.45, 0.80))
+PULL_MM = (4.0, 12.0)
+LIFT = (0.3, 0.7)
+SHARE: dict[View, tuple[float, float]] = {"CC": (0.46, 0.55), "MLO": (0.42, 0.51), "3D": (0.21, 0.21)}
+LESION = LesionRule((8.0, 20.0), skin_mm=5.0, back_mm=8.0, nipple_mm=45.0, aside_mm=16.0, off_axis=(0.55, 0.88))
 LANDMARKS = {"skin_mm": 6.0, "back_mm": 10.0, "apart_mm": 10.0}
-MESH = {"core": 8, "rows": 9, "shells": 3}
+MESH, COARSE = {"core": 8, "rows": 9, "shells": 3}, {"core": 4, "rows": 5, "shells": 1}
 MARGIN_MM = np.array([30.0, 30.0, 28.0])
 TORSO_DEPTH_MM = 75.0
 
@@ -77,10 +82,25 @@ def draw_each(ranges: dict[str, tuple[float, float]], random: Generator) -> dict
 
 
 def draw_shape(random: Generator) -> BreastShape:
-    """A breast on its torso."""
-    size, torso, shape = float(random.uniform(*SIZE)), draw_each(TORSO, random), draw_each(SHAPE, random)
-    shape |= {name: size * shape[name] for name in SCALED}
-    return BreastShape(torso=Torso(front_p=0.0, **torso), **shape)
+    """A breast of a drawn volume on its torso."""
+    volume, torso, shape = float(random.uniform(*VOLUME_CM3)), draw_each(TORSO, random), draw_each(SHAPE, random)
+    breast = BreastShape(torso=Torso(front_p=0.0, **torso), **shape)
+
+    def excess(size: float) -> float:
+        return volume_cm3(scaled(breast, size)) - volume
+
+    return scaled(breast, float(brentq(excess, 0.3, 2.0, xtol=1e-4)))
+
+
+def scaled(shape: BreastShape, size: float) -> BreastShape:
+    """The shape with the lengths of `SCALED` times a factor."""
+    return replace(shape, **{name: size * getattr(shape, name) for name in SCALED})
+
+
+def volume_cm3(shape: BreastShape) -> float:
+    """Volume in cm3 in front of the chest wall."""
+    mesh = breast_mesh(shape, **COARSE)
+    return float(volumes(mesh.points[mesh.hexes]).sum()) * 1e-3
 
 
 @dataclass(frozen=True)
@@ -171,4 +191,4 @@ def draw_placement(shape: BreastShape, view: View, random: Generator) -> Placeme
     back = float(shape.back(shape.centre_m, shape.centre_s))
     edge = back - float(random.uniform(*EDGE_MM))
     share, pull = float(random.uniform(*SHARE[view])), float(random.uniform(*PULL_MM))
-    return Placement(HEADER_ANGLE_DEG[view] + roll, edge, share, pull)
+    return Placement(HEADER_ANGLE_DEG[view] + roll, edge, share, pull, float(random.uniform(*LIFT)))

@@ -101,6 +101,13 @@ class BreastShape:
             axis=-1,
         )
 
+    def axis_direction(self, p: ArrayLike) -> Array:
+        """Unit vectors (..., 3) along the bent axis at posterior coordinates p in mm, towards the nipple."""
+        t = np.clip((self.base_p - np.asarray(p, dtype=float)) / self.length, 0.0, 1.0)
+        bend = 1.5 * np.sqrt(t)
+        along = np.stack([self.drop_m * bend, np.full_like(t, -self.length), self.drop_s * bend], axis=-1)
+        return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
+
     @property
     def tip(self) -> Array:
         """Foremost point of the breast's own surface, where the nipple stands: (3,), mm."""
