@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mammoreg.fem.boundary import back_condition
-from mammoreg.fem.closing import Closed, Closing
+from mammoreg.fem.closing import Closed, Closing, ClosingOptions
 from mammoreg.fem.membrane import Membrane
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.prescribed import solve_prescribed
@@ -27,7 +27,13 @@ def _model(mesh=MESH) -> HyperelasticModel:
     return HyperelasticModel(mesh.points, mesh.hexes(), neo_hookean(MU, 0.495))
 
 
-def _closed(model: HyperelasticModel, skin: SkinModel, compression: float, friction: float) -> Closed:
+def _closed(
+    model: HyperelasticModel,
+    skin: SkinModel,
+    compression: float,
+    friction: float,
+    options: ClosingOptions | None = None,
+) -> Closed:
     back = back_condition("slide_compression", model.points, MESH.back_quads(), along_kpa_per_mm=MU / 35.0)
     closing = Closing(
         model,
@@ -35,6 +41,7 @@ def _closed(model: HyperelasticModel, skin: SkinModel, compression: float, frict
         back,
         edge_p_mm=-8.0,
         friction=friction if skin.shear_passes else 0.0,
+        options=options,
         parts=skin.parts,
         extra_nodes=skin.extra_nodes,
     )
@@ -45,7 +52,7 @@ def _over_sheet(adherent: bool) -> tuple[SkinInterface, np.ndarray, int]:
     """A sheet on a sheet: interface, nodes, number of the lower sheet's nodes."""
     points, quads = sheet(4)
     both = np.concatenate([points, points])
-    return skin_interface(both, quads, quads + len(points), 30.0, adherent=adherent), both, len(points)
+    return skin_interface(both, quads, quads + len(points), 30.0, 0.3, adherent=adherent), both, len(points)
 
 
 def test_none_brings_nothing() -> None:
@@ -101,13 +108,14 @@ def test_interface_stiffness_and_force_are_derivatives_of_the_energy(adherent) -
 def test_sliding_interface_bears_pressure_and_neither_shear_nor_more_than_a_trace_of_pull() -> None:
     interface, points, count = _over_sheet(adherent=False)
     force = {}
+    inner = (points[count:, :2] < 35.0).all(axis=1)
     for name, shift in {"pressed": [0, 0, -0.5], "lifted": [0, 0, 0.5], "slid": [3.0, 2.0, 0.0]}.items():
         positions = points.copy()
         positions[count:] += np.array(shift, dtype=float)
-        force[name] = assembled(interface.renewed(positions), positions)[0].reshape(-1, 3)[count:].sum(axis=0)
-    assert force["pressed"][2] == pytest.approx(-30.0 * 0.45 * 1600.0, rel=2e-3)
-    assert 0.0 < force["lifted"][2] < 3e-3 * abs(force["pressed"][2])
-    np.testing.assert_allclose(force["slid"], 0.0, atol=1e-9)
+        force[name] = assembled(interface.renewed(positions), positions)[0].reshape(-1, 3)[count:]
+    assert force["pressed"].sum(axis=0)[2] == pytest.approx(-30.0 * 0.45 * 1600.0, rel=2e-3)
+    assert 0.0 < force["lifted"].sum(axis=0)[2] < 3e-3 * 30.0 * 0.5 * 1600.0
+    np.testing.assert_allclose(force["slid"][inner], 0.0, atol=1e-9)
 
 
 def test_adherent_interface_holds_against_slip_until_it_is_lifted_off() -> None:
@@ -120,7 +128,8 @@ def test_adherent_interface_holds_against_slip_until_it_is_lifted_off() -> None:
     free = interface.renewed(lifted)
     assert not free.stuck.any()
     slid[count:, 2] += 1.0
-    assert assembled(free, slid)[0].reshape(-1, 3)[count:, 0] == pytest.approx(0.0, abs=1e-9)
+    loose = assembled(free, slid)[0].reshape(-1, 3)[count:].sum(axis=0)
+    assert abs(loose[0]) < 1e-4 * held[0]
 
 
 def test_projection_finds_known_feet_on_a_round_surface() -> None:
@@ -148,7 +157,7 @@ def test_skin_stretched_over_a_cylinder_presses_with_tension_over_radius() -> No
     points = np.concatenate([body, slack])
     law = TensionLinear(10.0)
     membrane = Membrane(points, quads + len(body), law, thickness)
-    interface = skin_interface(points, quads, quads + len(body), 500.0, adherent=False)
+    interface = skin_interface(points, quads, quads + len(body), 500.0, law.mu_kpa, adherent=False)
     turn = rotation((0.0, 0.0, 1.0), 0.3 * 2.0 * np.pi / around)
     start = np.concatenate([body, 1.001 * body @ turn.T * [1, 1, 0] + body * [0, 0, 1]])
     free = np.zeros(points.shape, dtype=bool)
@@ -169,15 +178,16 @@ def test_breast_with_skin_comes_to_rest_between_plates_with_friction(name, compr
     model = _model()
     skin = skin_model(name, model, MESH.skin_quads())
     closed = _closed(model, skin, compression, 0.46)
-    assert closed.restless_mm < 0.2
+    assert closed.restless_mm < 0.1
     assert closed.force_n[0] == pytest.approx(closed.force_n[1], rel=0.02)
     assert closed.min_det_f > 0.4
     assert closed.iterations < 90
+    assert closed.cuts == 0
     if name != "attached":
         interface = closed.state.parts[1]
         gap = interface.gap_mm(closed.state.positions)
         assert gap.min() > -0.3
-        assert gap.max() < 2.5
+        assert gap.max() < 0.5
 
 
 def test_skin_of_no_thickness_changes_nothing() -> None:
@@ -200,7 +210,7 @@ def test_adherent_skin_on_a_stiff_interface_is_attached_skin() -> None:
     attached = _closed(_model(), skin_model("attached", _model(), MESH.skin_quads()), 0.35, 0.0)
     apart, force = [], []
     for stiffness in (40.0, 4000.0):
-        skin = skin_model("adherent", _model(), MESH.skin_quads(), interface_per_mm=stiffness)
+        skin = skin_model("adherent", _model(), MESH.skin_quads(), pressed_per_mm=stiffness)
         adherent = _closed(_model(), skin, 0.35, 0.0)
         apart.append(np.linalg.norm(adherent.deformed - attached.deformed, axis=1).max())
         force.append(adherent.force_n[0] / attached.force_n[0])
@@ -230,3 +240,16 @@ def test_mirrored_breast_has_mirrored_skin() -> None:
     one = _closed(model, skin_model("sliding", model, MESH.skin_quads()), 0.35, 0.0)
     two = _closed(other, skin_model("sliding", other, flipped.skin_quads()), 0.35, 0.0)
     np.testing.assert_allclose(two.deformed[mirror] * [-1.0, 1.0, 1.0], one.deformed, atol=0.05)
+
+
+def test_sliding_skin_at_rest_is_in_equilibrium_by_itself() -> None:
+    model = _model()
+    skin = skin_model("sliding", model, MESH.skin_quads())
+    closed = _closed(model, skin, 0.35, 0.0, ClosingOptions(tolerance_mm=0.002, rests=40))
+    membrane, interface = closed.state.parts
+    positions, count = closed.state.positions, len(MESH.points)
+    pulled, pressed = (assembled(part, positions)[0].reshape(-1, 3)[count:] for part in (membrane, interface))
+    scale = np.linalg.norm(pulled, axis=1).max()
+    assert np.linalg.norm(pulled + pressed, axis=1).max() < 0.1 * scale
+    across = pressed - (pressed * interface.normal).sum(axis=1, keepdims=True) * interface.normal
+    assert np.linalg.norm(across, axis=1).max() < 1e-6 * scale

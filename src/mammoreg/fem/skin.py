@@ -29,8 +29,8 @@ from mammoreg.materials.isochoric import IsochoricLaw
 
 SkinName = Literal["none", "attached", "sliding", "adherent"]
 PAPER_SKIN = TensionLinear()
-INTERFACE_PER_MM = 40.0
-"""Stiffness of the interface in units of the body's mean shear modulus, 1/mm."""
+PRESSED_PER_MM, RESTING_PER_MM = 40.0, 10.0
+"""Stiffness of the interface, 1/mm: under plates in units of the body's mean shear modulus, else of the skin's."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def skin_model(
     skin_quads: NDArray[np.integer],
     law: IsochoricLaw = PAPER_SKIN,
     thickness_mm: float = SKIN_THICKNESS_MM,
-    interface_per_mm: float = INTERFACE_PER_MM,
+    pressed_per_mm: float = PRESSED_PER_MM,
 ) -> SkinModel:
     """Skin of a body.
 
@@ -66,7 +66,7 @@ def skin_model(
         skin_quads: faces (F, 4) of its surface, outward, without those of the back.
         law: of the skin; not looked at for `none`.
         thickness_mm: undeformed.
-        interface_per_mm: of the enclosing membranes, in units of the body's mean shear modulus.
+        pressed_per_mm: stiffness of the interface of an adherent skin, in units of the body's mean shear modulus.
 
     Raises:
         ValueError: no such model of skin.
@@ -81,9 +81,11 @@ def skin_model(
     adherent = name == "adherent"
     own, under = _enclosing(quads, len(model.points))
     points = np.concatenate([model.points, model.points[under]])
-    mu = float(np.average(model.material.mu_kpa, weights=model.volume))
+    stiffness = RESTING_PER_MM * law.mu_kpa
+    if adherent:
+        stiffness = pressed_per_mm * float(np.average(model.material.mu_kpa, weights=model.volume))
     membrane = Membrane(points, own, law, thickness_mm)
-    interface = skin_interface(points, quads, own, interface_per_mm * mu, adherent=adherent)
+    interface = skin_interface(points, quads, own, stiffness, law.mu_kpa, adherent=adherent)
     return SkinModel((membrane, interface), points[len(model.points) :], own if adherent else quads, adherent)
 
 

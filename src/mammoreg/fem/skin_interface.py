@@ -6,9 +6,12 @@ Newton's method does not chatter from face to face:
 
     g = n . (x_skin - x_foot)                          gap, mm
     psi = area (integral of the barrier's pressure)    barrier as in `mammoreg.contact.soft`, its onset at g = 0
-        + area kappa/2 |tangential part of x_skin - x_foot|^2   where the skin sticks
+        + area cling/2 g^2
+        + area kappa/2 |tangential part of x_skin - x_foot|^2
 
-A lifted skin is drawn back by a thousandth of the barrier's stiffness, so that slack skin keeps a place.
+Where skin sticks, its foot stays and kappa is as stiff as the barrier. Where it slides, the foot follows it at each
+renewal and a soft kappa only keeps it from leaping back and forth between one foot and the next: at rest it bears
+nothing. The weak cling gives slack skin that has lifted off a place.
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +24,8 @@ from mammoreg.fem.system import node_dofs
 
 ONSET_MM = 0.05
 """Half the depth over which the barrier's stiffness grows to its whole value."""
-CLING_SHARE = 1e-3
+CLING_PER_MM, DRAG_PER_MM = 0.1, 0.002
+"""Stiffness against lifting off, and against sliding within a step, in units of the skin's shear modulus, 1/mm."""
 TOUCH_MM = 0.5
 """Skin nearer than this to the tissue touches it, and sticks where it adheres."""
 
@@ -35,6 +39,8 @@ class SkinInterface:
         nodes: of the skin (M,).
         area: undeformed area (M,) of skin around each, mm2.
         stiffness: of the barrier, and of the springs where skin sticks, kPa/mm.
+        cling: stiffness of the gap beside the barrier, kPa/mm.
+        drag: of the springs where skin slides, kPa/mm.
         adherent: whether skin sticks where it touches.
         face: faces (M,) of the feet.
         shape: shares (M, 4) of their corners.
@@ -46,6 +52,8 @@ class SkinInterface:
     nodes: Integers
     area: Array
     stiffness: float
+    cling: float
+    drag: float
     adherent: bool
     face: Integers
     shape: Array
@@ -63,7 +71,7 @@ class SkinInterface:
         gap = self._along(apart)
         pressure, slope = self._barrier(gap)
         dyad = self.normal[:, :, None] * self.normal[:, None, :]
-        hold = np.where(self.stuck, self.stiffness, 0.0)
+        hold = np.where(self.stuck, self.stiffness, self.drag)
         pull = -pressure[:, None] * self.normal + hold[:, None] * (apart - gap[:, None] * self.normal)
         stiff = slope[:, None, None] * dyad + hold[:, None, None] * (np.eye(3) - dyad)
         shares = np.column_stack([np.ones(len(self.nodes)), -self.shape])
@@ -79,9 +87,9 @@ class SkinInterface:
         depth = np.maximum(-gap, 0.0)
         early, late = np.minimum(depth, 2.0 * ONSET_MM), np.maximum(depth - 2.0 * ONSET_MM, 0.0)
         density = self.stiffness * (early**3 / (12.0 * ONSET_MM) + late * (ONSET_MM + 0.5 * late))
-        density += 0.5 * CLING_SHARE * self.stiffness * gap**2
+        density += 0.5 * self.cling * gap**2
         slip = apart - gap[:, None] * self.normal
-        density += 0.5 * np.where(self.stuck, self.stiffness, 0.0) * (slip**2).sum(axis=1)
+        density += 0.5 * np.where(self.stuck, self.stiffness, self.drag) * (slip**2).sum(axis=1)
         return 1e-3 * float((self.area * density).sum())
 
     def renewed(self, positions: Array) -> "SkinInterface":
@@ -114,7 +122,7 @@ class SkinInterface:
         depth = np.clip(-gap, 0.0, 2.0 * ONSET_MM)
         slope = self.stiffness * depth / (2.0 * ONSET_MM)
         pressure = 0.5 * slope * depth + self.stiffness * np.maximum(-gap - 2.0 * ONSET_MM, 0.0)
-        return pressure - CLING_SHARE * self.stiffness * gap, slope + CLING_SHARE * self.stiffness
+        return pressure - self.cling * gap, slope + self.cling
 
 
 def skin_interface(
@@ -122,6 +130,7 @@ def skin_interface(
     body_quads: NDArray[np.integer],
     skin_quads: NDArray[np.integer],
     stiffness: float,
+    skin_mu_kpa: float,
     *,
     adherent: bool,
 ) -> SkinInterface:
@@ -131,7 +140,8 @@ def skin_interface(
         points: undeformed nodes (N, 3) of body and skin, mm.
         body_quads: faces (F, 4) of the body's surface, outward.
         skin_quads: the faces (F, 4) of the skin over them; nodes that both name are tied and have no interface.
-        stiffness: kPa/mm.
+        stiffness: of the barrier, kPa/mm.
+        skin_mu_kpa: initial shear modulus of the skin.
         adherent: whether skin sticks where it touches.
     """
     surface = QuadSurface(body_quads)
@@ -141,5 +151,16 @@ def skin_interface(
     nodes = over[own]
     face, shape = surface.faces_of(under[own])
     area = np.linalg.norm(QuadSurface(skin_quads).areas(points), axis=1)[nodes]
-    normal = surface.normal_at(points, face, shape)
-    return SkinInterface(surface, nodes, area, stiffness, adherent, face, shape, normal, np.full(len(nodes), adherent))
+    return SkinInterface(
+        surface=surface,
+        nodes=nodes,
+        area=area,
+        stiffness=stiffness,
+        cling=CLING_PER_MM * skin_mu_kpa,
+        drag=DRAG_PER_MM * skin_mu_kpa,
+        adherent=adherent,
+        face=face,
+        shape=shape,
+        normal=surface.normal_at(points, face, shape),
+        stuck=np.full(len(nodes), adherent),
+    )
