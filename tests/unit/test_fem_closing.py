@@ -94,6 +94,16 @@ def test_pull_moves_the_back() -> None:
     np.testing.assert_allclose(pulled[mesh.back_nodes(), 1], -6.0)
 
 
+def test_pulled_springs_draw_the_back_along_with_the_load_steps() -> None:
+    mesh = breast()
+    closed = closing(mesh, "springs", pull=np.array([0.0, -6.0, 0.0])).close(GAP)
+    moved = (closed.deformed - mesh.points)[mesh.back_nodes(), 1]
+    np.testing.assert_allclose(moved, -6.0, atol=0.5)
+    assert closed.report is not None
+    assert closed.report.unbalance < 1e-3
+    assert closed.report.parts_mj["BackSprings"] > 0.0
+
+
 def test_coarse_options_are_near_the_fine_ones(closed: Closed) -> None:
     coarse = closing(breast(), options=COARSE).close(GAP)
     shift = closed.height_mm - coarse.height_mm
