@@ -64,17 +64,17 @@ class LesionRule:
     off_axis: tuple[float, float]
 
     def draw(self, shape: BreastShape, random: Generator) -> Lesion:
-        """Draw size, then places until one fits.
+        """Draw sizes and places together until one fits.
 
         Raises:
             ValueError: none of 10000 places fits; the rule asks for more room than the breast has.
         """
-        radius = 0.5 * random.uniform(*self.diameter_mm)
         stretch = random.uniform(0.85, 1.2, size=3)
-        half_axes = radius * stretch / np.cbrt(stretch.prod())
+        unit = stretch / np.cbrt(stretch.prod())
         spicules = random.standard_normal((SPICULES, 3))
         spicules /= np.linalg.norm(spicules, axis=1, keepdims=True)
         for _ in range(10000):
+            half_axes = 0.5 * random.uniform(*self.diameter_mm) * unit
             place = draw_inside(shape, random)
             if self._fits(shape, place, float(half_axes.max())):
                 return Lesion(place, half_axes, spicules)

@@ -69,7 +69,7 @@ EDGE_MM = (6.0, 12.0)
 PULL_MM = (4.0, 12.0)
 LIFT = (0.3, 0.7)
 SHARE: dict[View, tuple[float, float]] = {"CC": (0.46, 0.55), "MLO": (0.42, 0.51), "3D": (0.21, 0.21)}
-LESION = LesionRule((8.0, 20.0), skin_mm=5.0, back_mm=8.0, nipple_mm=45.0, aside_mm=16.0, off_axis=(0.55, 0.88))
+LESION = LesionRule((8.0, 20.0), skin_mm=5.0, back_mm=20.0, nipple_mm=40.0, aside_mm=16.0, off_axis=(0.50, 0.90))
 LANDMARKS = {"skin_mm": 6.0, "back_mm": 10.0, "apart_mm": 10.0}
 MESH, COARSE = {"core": 8, "rows": 9, "shells": 3}, {"core": 4, "rows": 5, "shells": 1}
 MARGIN_MM = np.array([30.0, 30.0, 28.0])
