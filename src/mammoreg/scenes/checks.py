@@ -16,8 +16,8 @@ PLATES = 0.01
 """Largest difference of the plates' forces, and of a recomputed from a reported force, as a share of the force."""
 CONTACT = 0.01
 """Largest share of the load that acts away from the plates, and of friction above its limit."""
-PENETRATION_MM = 2.0
-"""Deepest contact point inside a plate: the plates are soft, above all at their lips."""
+PENETRATION = 0.05
+"""Deepest contact point inside a plate, as a share of their gap: the contact is soft, which shows at the lips."""
 REACH_MM = 1.0
 """Pressure further than this from a plate acts on nothing."""
 
@@ -53,7 +53,7 @@ def outside_checks(scene: Scene, closed: Closed) -> tuple[Check, ...]:
         Check("volume change", volume, bound),
         Check("load away from the plates", pressed.detached_share(closed.deformed, REACH_MM), CONTACT),
         Check("friction above its limit", pressed.excess_friction(scene.points, scene.scenario.friction), CONTACT),
-        Check("penetration in mm", pressed.penetration_mm(closed.deformed), PENETRATION_MM),
+        Check("penetration over gap", pressed.penetration_mm(closed.deformed) / closed.gap_mm, PENETRATION),
     )
 
 

@@ -1,6 +1,6 @@
 """A scenario as a breast between plates, with the pipeline's own back, plates and numerical settings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ EDGE_MM = 8.0
 LIP_RADIUS_MM = 8.0
 BACK_LAYER_MM = 35.0
 """Tissue between the back and the chest wall, which shears as the back slides; as in the pipeline."""
-OPTIONS = ClosingOptions(rests=24, stiffening=(3.0, 10.0, 30.0, 100.0, 300.0))
-"""The pipeline's settings, but for a contact that ends stiffer: laws that stiffen press through the pipeline's by
-several millimetres at the lips, whose stiffness is measured by the mean initial shear modulus."""
+TOLERANCE_MM, RESTS = 0.01, 24
+FACTORS = (3.0, 10.0, 30.0, 100.0)
+STIFFEST_PER_MM = 120.0
+"""Contact at rest, in shear moduli of fat: the skin lies on fat, whatever the gland within."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Scene:
         return self.closing.close((1.0 - self.scenario.compression) * self.closing.uncompressed_mm)
 
 
-def build_scene(scenario: Scenario, mesh: BlockMesh, options: ClosingOptions = OPTIONS) -> Scene:
+def build_scene(scenario: Scenario, mesh: BlockMesh) -> Scene:
     """The scene of a scenario on a mesh of its shape (breast frame, `scenario.elements` a side)."""
     gland = gland_share(scenario.elements)
     tissue = scene_tissue(scenario.material, scenario.poisson, scenario.contrast, scenario.compression, gland)
@@ -64,5 +65,18 @@ def build_scene(scenario: Scenario, mesh: BlockMesh, options: ClosingOptions = O
     shear = FAT_KPA / BACK_LAYER_MM
     back = back_condition("slide_compression", mesh.points, mesh.back_quads(), along_kpa_per_mm=shear)
     edge = float(mesh.points[mesh.back_nodes(), 1].mean()) - EDGE_MM
+    options = contact_options(float(np.average(model.material.mu_kpa, weights=model.volume)))
     closing = Closing(model, mesh.skin_quads(), back, edge, LIP_RADIUS_MM, scenario.friction, options)
     return Scene(scenario, mesh.points, mesh.hexes(), mesh.skin_quads(), tissue, back, edge, closing)
+
+
+def contact_options(mean_kpa: float) -> ClosingOptions:
+    """The pipeline's settings for a mean shear modulus, but for a stiffer contact and forces that balance closer.
+
+    The pipeline's contact is measured by that mean: around a gland of 1000 kPa it is stiff for the fat that it meets,
+    in homogeneous tissue it lets the lips in by millimetres.
+    """
+    plain = ClosingOptions()
+    most = STIFFEST_PER_MM * FAT_KPA / (plain.penalty_per_mm * mean_kpa)
+    factors = tuple(f for f in FACTORS if f <= max(most, plain.stiffening[-1]))
+    return replace(plain, tolerance_mm=TOLERANCE_MM, rests=RESTS, stiffening=factors)

@@ -6,11 +6,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.closing import Closed, ClosingOptions
+from mammoreg.fem.closing import Closed
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.scenes.checks import Check, min_jacobian, outside_checks
 from mammoreg.scenes.scenario import Scenario
-from mammoreg.scenes.scene import OPTIONS, Scene, build_scene
+from mammoreg.scenes.scene import Scene, build_scene
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class Trial:
         return {**asdict(self), "checks": checks, "checks_passed": self.checks_passed}
 
 
-def try_scenario(scenario: Scenario, mesh: BlockMesh, options: ClosingOptions = OPTIONS) -> Trial:
+def try_scenario(scenario: Scenario, mesh: BlockMesh) -> Trial:
     """Solve a scenario on a mesh of its shape and check the answer."""
-    scene = build_scene(scenario, mesh, options)
+    scene = build_scene(scenario, mesh)
     start = time.perf_counter()
     try:
         closed = scene.closed()
