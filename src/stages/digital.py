@@ -19,7 +19,7 @@ from stages.digital_files import mammogram_dicom, mask_png, mr_dicom, nifti, poi
 
 MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1300, 900
 SOURCE_DETECTOR_MM, SUPPORT_DETECTOR_MM = 650.0, 15.0
-OFF_CENTRE_MM = 8.0
+OFF_CENTRE_MM, BEHIND_EDGE_MM = 8.0, 12.0
 HEADER_THICKNESS_OFF_MM = 2.0
 LANDMARKS, VOLUNTEER_LANDMARKS, SURFACE_POINTS = 30, 17, 16
 EXPOSURE = Exposure(photons=4.0e4, scatter=0.35, scatter_mm=10.0, blur_mm=0.15, equalisation=0.6)
@@ -134,12 +134,13 @@ class Making:
     def _mammogram(self, view: View, number: int) -> None:
         patient, random = self.patient, self.patient.stream(20 + number)
         pressed, deformed = patient.pressed(view)
-        low, high = pressed.deformed.min(axis=0), pressed.deformed.max(axis=0)
+        imaged = pressed.deformed[:, 1] < patient.placements[view].edge_p_mm + BEHIND_EDGE_MM
+        low, high = pressed.deformed[imaged].min(axis=0), pressed.deformed[imaged].max(axis=0)
         middle = 0.5 * (low[0] + high[0]) + float(random.uniform(-OFF_CENTRE_MM, OFF_CENTRE_MM))
         geometry = view_geometry(patient, view, pressed, middle)
         self._note_press(view, pressed, deformed, middle)
         pectoral = Pectoral(low[0], 40.0, 0.7 * (high[0] - low[0]), 0.6) if view == "MLO" else None
-        origins = deformed.tabulated(*_around(deformed.deformed))
+        origins = deformed.tabulated(*_around(deformed.deformed[imaged]))
         image = project(geometry, origins.at, (low[0] - 2.0, high[0] + 2.0), low[1] - 10.0, pectoral)
         pixels = presented(image, EXPOSURE, PIXEL_MM, random)
         thickness = round(pressed.gap_mm + random.uniform(-HEADER_THICKNESS_OFF_MM, HEADER_THICKNESS_OFF_MM))

@@ -51,7 +51,7 @@ class Volume:
         """Interpolate at points (..., 3) in mm; `order` 0 is nearest, 1 is linear; `outside` fills beyond the grid."""
         index = np.moveaxis(self.to_index(points), -1, 0)
         values = ndimage.map_coordinates(
-            self.data.astype(np.float32), index, order=order, mode="constant", cval=outside, prefilter=False
+            self.data.astype(np.float32, copy=False), index, order=order, mode="constant", cval=outside, prefilter=False
         )
         return np.asarray(values, dtype=float)
 

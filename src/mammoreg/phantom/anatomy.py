@@ -63,8 +63,18 @@ class Anatomy:
     lesion: Lesion | None
 
     def at(self, points: Array) -> Tissue:
-        """Tissue at undeformed points (N, 3), mm."""
+        """Tissue at undeformed points (N, 3), mm; nothing but the nipple is looked for in the air."""
         depth = self.depth.sample(points, outside=-1.0)
+        kind, gland = np.full(len(points), AIR, dtype=np.uint8), np.zeros(len(points), dtype=np.float32)
+        body = np.flatnonzero(depth >= 0.0)
+        kind[body] = self._layer(points[body], depth[body])
+        kind[self._in_nipple(points)] = SKIN
+        soft = np.flatnonzero(kind == SOFT)
+        gland[soft] = self.gland.sample(points[soft])
+        return Tissue(kind, gland, self._lesion_share(points))
+
+    def _layer(self, points: Array, depth: Array) -> NDArray[np.uint8]:
+        """Kind of tissue at points (N, 3) in the body at a depth (N,) below the skin, mm."""
         behind = self.shape.torso.level(points[:, 0], points[:, 1], points[:, 2]) - self.layers.fat
         behind += self._undulation(points)
         inside = behind - self.layers.muscle
@@ -73,10 +83,7 @@ class Anatomy:
         kind[inside > 0.0] = np.where(self._between_ribs(points[inside > 0.0]), MUSCLE, RIB)
         kind[inside > self.layers.ribs] = LUNG
         kind[depth < self.layers.skin] = SKIN
-        kind[depth < 0.0] = AIR
-        kind[self._in_nipple(points)] = SKIN
-        gland = np.where(kind == SOFT, self.gland.sample(points), 0.0).astype(np.float32)
-        return Tissue(kind, gland, self._lesion_share(points))
+        return kind
 
     def _in_nipple(self, points: Array) -> NDArray[np.intp]:
         """Numbers of the points in the nipple."""
