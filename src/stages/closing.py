@@ -47,7 +47,7 @@ def closing_plates(
         breast.back,
         edge_p_mm if mechanics.plates_end else None,
         mechanics.lip_radius_mm,
-        mechanics.friction,
+        mechanics.friction if breast.skin.shear_passes else 0.0,
         options,
         lower_mm,
         (*breast.loads, *breast.skin.parts),

@@ -55,7 +55,8 @@ REPORT = {
 }
 _OWN = "the run's own mechanics"
 _PLAIN = "the run's mechanics but for the tissue, which is the paper's: homogeneous and without fibres unless varied"
-_SETTING = {"table_2": ("plain", _PLAIN), "table_3": ("own", _OWN), "table_4": ("plain", _PLAIN)}
+_SMOOTH = f"{_PLAIN}, between smooth plates, for a sliding skin lets no friction through to the tissue"
+_SETTING = {"table_2": ("plain", _PLAIN), "table_3": ("own", _OWN), "table_4": ("smooth", _SMOOTH)}
 
 
 class Settings(SettingsModel):

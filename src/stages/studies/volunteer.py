@@ -41,6 +41,13 @@ class Settings(SettingsModel):
         le=20.0,
         description="`fibre_ratio` of Tables II and IV; 0 is the paper's isotropic tissue. Table III has the run's own",
     )
+    skin_friction: float = Field(
+        0.0,
+        ge=0.0,
+        le=2.0,
+        description="plates' friction in Table IV; none passes through a sliding skin, so that only without any do the "
+        "rows differ by the skin alone",
+    )
     point_stiffness: float = Field(
         100.0,
         gt=0.0,
@@ -76,12 +83,13 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     else:
         plan = _plan(inputs, subject, case)
         own, plain = _own(plan), _paper_tissue(plan, settings)
+        smooth = plain.model_copy(update={"friction": settings.skin_friction})
         outcomes = {
             "table_2": {m: _compressed(plan, case, plain.model_copy(update={"material": m})) for m in MATERIALS},
             "table_3": _boundaries(inputs, case, settings),
-            "table_4": {skin: _compressed(plan, case, plain.model_copy(update={"skin": skin})) for skin in SKINS},
+            "table_4": {skin: _compressed(plan, case, smooth.model_copy(update={"skin": skin})) for skin in SKINS},
         }
-        values["mechanics"] = {"own": own.plain(), "plain": plain.plain()}
+        values["mechanics"] = {"own": own.plain(), "plain": plain.plain(), "smooth": smooth.plain()}
     for table, (key, _) in TABLES.items():
         values[f"{table}_rows"] = _rows(key, landmarks, outcomes[table])
     values["runs"] = [row for table, found in outcomes.items() for row in _runs(table, found)]
