@@ -116,6 +116,12 @@ def test_the_header_does_not_tell_the_truth(quick):
     assert float(header.BodyPartThickness).is_integer()
 
 
+def test_seeds_follow_each_other_in_the_order_of_the_table():
+    patients = Settings().patients
+    assert list(patients) == [row["case"] for row in rows("cases.tsv")]
+    assert [patient.seed for patient in patients.values()] == list(range(20271, 20278))
+
+
 def test_an_unknown_case_is_named_with_those_that_exist():
     with pytest.raises(DataError, match=r"no 'nobody'; it has clinical1"):
         make("nobody", "R")

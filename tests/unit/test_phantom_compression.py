@@ -136,9 +136,20 @@ def test_fibres_turn_the_breasts_elongation_sideways(patient, coarse):
     assert stiff[1] < soft[1] - 1.0
 
 
-def test_every_view_is_rolled_off_the_header():
+def test_placements_lie_in_their_ranges(patient):
     for seed in range(30):
-        patient = Patient.draw(seed, ("CC", "MLO"), healthy=True, landmarks=1)
-        for view, placement in patient.placements.items():
-            off = abs(placement.angle_deg - drawing.HEADER_ANGLE_DEG[view])
-            assert drawing.ROLL_DEG[0] <= off <= drawing.ROLL_DEG[1]
+        for view, header in drawing.HEADER_ANGLE_DEG.items():
+            placement = drawing.draw_placement(patient.shape, view, np.random.default_rng(seed))
+            assert drawing.ROLL_DEG[0] <= abs(placement.angle_deg - header) <= drawing.ROLL_DEG[1] <= 8.0
+            assert drawing.SHARE[view][0] <= placement.share <= drawing.SHARE[view][1]
+            behind = patient.shape.back(patient.shape.centre_m, patient.shape.centre_s) - placement.edge_p_mm
+            assert drawing.EDGE_MM[0] <= behind <= drawing.EDGE_MM[1]
+
+
+def test_the_cohort_is_as_hard_as_promised():
+    least, most = drawing.SHARE["CC"]
+    assert 0.40 <= least < most <= 0.55
+    assert drawing.SHARE["MLO"][1] < most
+    assert drawing.SHARE["3D"] == (0.21, 0.21)
+    assert drawing.LESION.diameter_mm == (8.0, 20.0)
+    assert drawing.VOLUME_CM3 == (250.0, 1000.0)

@@ -11,6 +11,7 @@ SPICULES = 9
 SPICULE_ANGLE_RAD = 0.22
 SPICULE_REACH = 0.4
 EDGE_MM = 1.2
+TRIES = 10000
 
 
 @dataclass(frozen=True)
@@ -67,13 +68,13 @@ class LesionRule:
         """Draw sizes and places together until one fits.
 
         Raises:
-            ValueError: none of 10000 places fits; the rule asks for more room than the breast has.
+            ValueError: none of `TRIES` places fits; the rule asks for more room than the breast has.
         """
         stretch = random.uniform(0.85, 1.2, size=3)
         unit = stretch / np.cbrt(stretch.prod())
         spicules = random.standard_normal((SPICULES, 3))
         spicules /= np.linalg.norm(spicules, axis=1, keepdims=True)
-        for _ in range(10000):
+        for _ in range(TRIES):
             half_axes = 0.5 * random.uniform(*self.diameter_mm) * unit
             place = draw_inside(shape, random)
             if self._fits(shape, place, float(half_axes.max())):
@@ -108,7 +109,7 @@ def draw_landmarks(
 ) -> Array:
     """Landmarks (count, 3) in mm, none nearer to skin, back or another one than given; first come, first kept."""
     kept: list[Array] = []
-    for _ in range(20000):
+    for _ in range(2 * TRIES):
         point = draw_inside(shape, random)
         deep = shape.level(*point) >= skin_mm and shape.back(point[0], point[2]) - point[1] >= back_mm
         if deep and all(np.linalg.norm(point - other) >= apart_mm for other in kept):
