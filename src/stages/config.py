@@ -27,8 +27,8 @@ class CohortKeys(BaseModel):
     stability_scan: str | None = Field(
         None,
         min_length=1,
-        description="MR volume (NIfTI, or a folder that holds one DICOM series) whose breast is one of the shapes of the "
-        "study `stability`; null: its scenarios are listed as not run.",
+        description="MR volume (NIfTI, or a folder that holds one DICOM series) whose breast is one of the shapes of "
+        "the study `stability`; null: its scenarios are listed as not run.",
     )
 
     def table_files(self, project: Path) -> tuple[Path, Path | None]:

@@ -104,7 +104,9 @@ def test_every_variation_has_a_row_for_each_landmark(studied: Artefact) -> None:
 def test_what_no_table_varies_is_the_main_run(studied: Artefact) -> None:
     plate = distances(studied, "table_3", "boundary", "plate")
     assert distances(studied, "table_2", "model", "homogeneous") == plate
-    assert distances(studied, "table_4", "skin", "none") == plate
+    without_skin = distances(studied, "table_4", "skin", "none")
+    assert without_skin != plate
+    np.testing.assert_allclose(without_skin, plate, atol=1.0)  # smooth plates alone
     moved = {(run["table"], run["name"]): run["moved_mm"] for run in studied.value("runs")}
     assert moved["table_2", "homogeneous"] == moved["table_3", "plate"] == moved["table_4", "none"] == 0.0
     assert moved["table_2", "lorenzen"] > 0.05
