@@ -113,7 +113,7 @@ def test_pages_show_both_numbers_sentences_and_settings(tables: Path) -> None:
         "Agrees with the paper: attached skin lowers the mean distance (paper: 3.4 to 3.3 mm; here: 3.4 to 3.3 mm)",
         "Does not agree: every skin lowers the mean lateral distance (paper: 2.6 to 2.1 and 1.8 and 1.8 mm; here: ",
         "paper: lateral maximum",
-        "fibre_ratio 0.0",
+        "friction 0.0",
         "<h2>Measurements</h2>",
     ):
         assert text in page
