@@ -5,7 +5,7 @@ import pytest
 
 from mammoreg.fem.boundary import back_condition
 from mammoreg.fem.closing import Closing, ClosingOptions
-from mammoreg.fem.damped import DampedState, Load
+from mammoreg.fem.damped_state import DampedState, Load
 from mammoreg.fem.damped_step import DampedStep
 from mammoreg.fem.gravity import gravity
 from mammoreg.fem.model import HyperelasticModel

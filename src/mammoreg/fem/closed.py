@@ -6,7 +6,8 @@ import numpy as np
 
 from mammoreg.contact.soft import SoftTerms
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
+from mammoreg.fem.damped import DampedEquilibrium
+from mammoreg.fem.damped_state import DampedState, Load
 from mammoreg.fem.parts import parts_at
 from mammoreg.fem.report import SolveReport, solve_report
 from mammoreg.fem.sparse import Array

@@ -14,7 +14,8 @@ from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
 from mammoreg.fem.closed import Closed
 from mammoreg.fem.closing_options import COARSE, ClosingOptions
-from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
+from mammoreg.fem.damped import DampedEquilibrium
+from mammoreg.fem.damped_state import DampedState, Load
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.parts import Part, all_nodes
 from mammoreg.fem.predictor import affine_predictor

@@ -7,48 +7,22 @@ steps are repeated with less of it the static equilibrium remains.
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mammoreg.contact.plate import Plate
-from mammoreg.contact.soft import SoftContact, SoftMemory, SoftTerms
+from mammoreg.contact.soft import SoftContact, SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
+from mammoreg.fem.damped_state import DampedState, Load
 from mammoreg.fem.damped_step import DampedStep
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.parts import Part, Parts, all_nodes, back_springs, parts_at
 from mammoreg.fem.report import Stopwatch
 from mammoreg.fem.sparse import Array, Integers
 from mammoreg.fem.system import NewtonSystem, node_dofs
-
-
-@dataclass(frozen=True)
-class DampedState:
-    """A deformation.
-
-    Attributes:
-        positions: nodes (N, 3), extra ones behind the body's, mm.
-        pressure: element pressures (E,), kPa.
-        height: the plates' extra height, mm.
-        memory: of the contact.
-        parts: as they were renewed here; None: as the equilibrium has them at first.
-    """
-
-    positions: Array
-    pressure: Array
-    height: float
-    memory: SoftMemory
-    parts: Parts | None = None
-
-
-@dataclass(frozen=True)
-class Load:
-    """What a step loads: plates (lower, upper), and the share of the back's pull and of gradual parts."""
-
-    plates: tuple[Plate, Plate]
-    share: float = 1.0
 
 
 class DampedEquilibrium:
@@ -81,7 +55,8 @@ class DampedEquilibrium:
     ) -> None:
         self.model, self.back, self.contact = model, back, contact
         self.points = all_nodes(model.points, extra_nodes)
-        self.springs, self.parts = back_springs(back, self.points), tuple(parts)
+        self.springs: Parts = back_springs(back, self.points)
+        self.parts = tuple(parts)
         self.total = self.points.size + 1
         self.held = np.zeros(self.points.shape, dtype=bool)
         self.held[back.nodes] = back.held

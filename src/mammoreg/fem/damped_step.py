@@ -8,18 +8,21 @@ only. Where an update points uphill the tangent is not positive definite; more d
 it so.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
+from mammoreg.contact.plate import Plate
+from mammoreg.contact.soft import SoftContact, SoftTerms
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.model import Residual
+from mammoreg.fem.damped_state import DampedState, Load
+from mammoreg.fem.model import HyperelasticModel, Residual
 from mammoreg.fem.parts import Parts
+from mammoreg.fem.report import Stopwatch
 from mammoreg.fem.sparse import Array
-
-if TYPE_CHECKING:
-    from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
+from mammoreg.fem.system import NewtonSystem
 
 LEAST_DET_SHARE = 0.2  # a Newton step may shrink the smallest det F to this share of itself
 RUNAWAY_MM = 200.0
@@ -42,6 +45,21 @@ class Balance:
     blocks: list[Array]
 
 
+class StepEquations(Protocol):
+    """What a step takes from its equilibrium: body, linear system, contact, springs of the back, record."""
+
+    model: HyperelasticModel
+    system: NewtonSystem
+    watch: Stopwatch
+    contact: SoftContact
+    springs: Parts
+    weight: Array
+    residuals: list[float]
+
+    def terms(self, state: DampedState, plates: Sequence[Plate]) -> SoftTerms:
+        """Contact at a state."""
+
+
 class DampedStep:
     """The equations of one step.
 
@@ -54,13 +72,13 @@ class DampedStep:
     """
 
     def __init__(
-        self, equilibrium: "DampedEquilibrium", start: "DampedState", load: "Load", acting: Parts, damping: float
+        self, equilibrium: StepEquations, start: DampedState, load: Load, acting: Parts, damping: float
     ) -> None:
         self.equilibrium, self.start, self.load, self.acting, self.damping = equilibrium, start, load, acting, damping
         self.model, self.system, self.watch = equilibrium.model, equilibrium.system, equilibrium.watch
         self.shift = 0.0
 
-    def solve(self, tolerance_mm: float) -> tuple["DampedState", str]:
+    def solve(self, tolerance_mm: float) -> tuple[DampedState, str]:
         """Iterate until an update is below the tolerance.
 
         Returns:
@@ -85,7 +103,7 @@ class DampedStep:
             last = largest
         return state, f"no equilibrium within {ITERATIONS} Newton iterations (last update {last:.2g} mm)"
 
-    def _plain_share(self, state: "DampedState", update: Array, largest: float, last: float) -> float:
+    def _plain_share(self, state: DampedState, update: Array, largest: float, last: float) -> float:
         """Share of an update that goes as it is; 0: it has to be searched along."""
         if self.shift > 0.0 or largest > RUNAWAY_MM or largest > CONTRACTING * last:
             return 0.0
@@ -95,7 +113,7 @@ class DampedStep:
             return 0.0
         return share if np.isinf(last) or share == 1.0 else 0.0
 
-    def _balance(self, state: "DampedState") -> Balance:
+    def _balance(self, state: DampedState) -> Balance:
         with self.watch.timing("contact"):
             contact = self.equilibrium.terms(state, self.load.plates)
         with self.watch.timing("assembly"):
@@ -108,15 +126,15 @@ class DampedStep:
         groups = [(internal.force, tangent), *pairs[:count], (contact.force, contact.stiffness), damped, *pairs[count:]]
         return Balance(internal, [vector for vector, _ in groups], [block for _, block in groups])
 
-    def unbalance(self, state: "DampedState") -> float:
+    def unbalance(self, state: DampedState) -> float:
         """Ratio of unbalanced to internal forces at a state."""
         return self.system.unbalance(self._balance(state).vectors)
 
-    def _way(self, state: "DampedState") -> Array:
+    def _way(self, state: DampedState) -> Array:
         """Displacement (total,) since the start."""
         return np.append((state.positions - self.start.positions).ravel(), state.height - self.start.height)
 
-    def _searched(self, state: "DampedState", balance: Balance, update: Array, pressure: Array) -> "DampedState":
+    def _searched(self, state: DampedState, balance: Balance, update: Array, pressure: Array) -> DampedState:
         """The state after a part of an update that lessens the merit, damped more until there is one."""
         gradient = self._gradient(balance)
         merit = self._merit(state.positions, state.height, state.pressure)
@@ -147,7 +165,7 @@ class DampedStep:
         with self.watch.timing("linear"):
             return self.system.increment(balance.internal, balance.vectors, blocks)
 
-    def _descending(self, state: "DampedState", update: Array, slope: float, merit: float) -> float:
+    def _descending(self, state: DampedState, update: Array, slope: float, merit: float) -> float:
         """Share of an update at which the merit has lessened; 0: there is none."""
         before = self.model.determinants(state.positions)
         share = min(1.0, LARGEST_MM / float(np.abs(update).max()))
@@ -182,7 +200,7 @@ class DampedStep:
         way = np.append((positions - self.start.positions).ravel(), height - self.start.height)
         return 1e3 * stored + volume + 0.5 * self.damping * float(self.equilibrium.weight @ way**2)
 
-    def _blame(self, state: "DampedState", update: Array) -> str:
+    def _blame(self, state: DampedState, update: Array) -> str:
         """Which element is the first to turn inside out along an update, or that none is."""
         before = self.model.determinants(state.positions)
         after = self.model.determinants(state.positions + SHORTEST * update[:-1].reshape(-1, 3))
@@ -194,7 +212,7 @@ class DampedStep:
         return f"no way downhill; most strained is {place} with det F {before[worst].min():.2g}"
 
 
-def _moved(state: "DampedState", share: float, update: Array, pressure: Array) -> "DampedState":
+def _moved(state: DampedState, share: float, update: Array, pressure: Array) -> DampedState:
     return replace(
         state,
         positions=state.positions + share * update[:-1].reshape(-1, 3),

@@ -10,7 +10,7 @@ from mammoreg.contact.soft import SoftMemory
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.boundary import BackCondition
 from mammoreg.fem.closing import Closed, Closing
-from mammoreg.fem.damped import DampedState
+from mammoreg.fem.damped_state import DampedState
 from mammoreg.fem.hierarchy import Array, Hierarchy, Integers, block_size, interpolate_elements, interpolation
 from mammoreg.fem.model import HyperelasticModel
 from mammoreg.fem.unfold import unfolded

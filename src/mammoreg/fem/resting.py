@@ -7,7 +7,8 @@ import numpy as np
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.closed import Closed, closed_state
 from mammoreg.fem.closing_options import ClosingOptions
-from mammoreg.fem.damped import DampedEquilibrium, DampedState, Load
+from mammoreg.fem.damped import DampedEquilibrium
+from mammoreg.fem.damped_state import DampedState, Load
 
 STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
 REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
