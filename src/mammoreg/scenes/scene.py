@@ -14,7 +14,8 @@ from mammoreg.scenes.scenario import Scenario
 from mammoreg.scenes.tissue import FAT_KPA, Tissue, scene_tissue
 
 EDGE_MM = 8.0
-"""The plates end this far in front of the back's mean place."""
+"""The plates end this far in front of the back's mean place, and behind none of its nodes: these are held and cannot
+make way."""
 LIP_RADIUS_MM = 8.0
 BACK_LAYER_MM = 35.0
 """Tissue between the back and the chest wall, which shears as the back slides; as in the pipeline."""
@@ -64,7 +65,8 @@ def build_scene(scenario: Scenario, mesh: BlockMesh) -> Scene:
     model = HyperelasticModel(mesh.points, mesh.hexes(), tissue.material())
     shear = FAT_KPA / BACK_LAYER_MM
     back = back_condition("slide_compression", mesh.points, mesh.back_quads(), along_kpa_per_mm=shear)
-    edge = float(mesh.points[mesh.back_nodes(), 1].mean()) - EDGE_MM
+    place = mesh.points[mesh.back_nodes(), 1]
+    edge = min(float(place.mean()) - EDGE_MM, float(place.min()))
     options = contact_options(float(np.average(model.material.mu_kpa, weights=model.volume)))
     closing = Closing(model, mesh.skin_quads(), back, edge, LIP_RADIUS_MM, scenario.friction, options)
     return Scene(scenario, mesh.points, mesh.hexes(), mesh.skin_quads(), tissue, back, edge, closing)
