@@ -69,3 +69,12 @@ def test_factors_serve_more_than_one_right_hand_side(kind: type[PardisoSolver] |
     for rhs in np.eye(2):
         np.testing.assert_allclose(matrix @ solver.back_substitute(rhs), rhs, atol=1e-12)
     assert solver.factorisations == 1
+
+
+@pytest.mark.parametrize("kind", [PardisoSolver, SuperLuSolver])
+def test_strided_and_integer_vectors_are_read_as_they_are(kind: type[PardisoSolver] | type[SuperLuSolver]) -> None:
+    if kind is PardisoSolver:
+        pytest.importorskip("pypardiso")
+    solver = kind(np.array([0, 1, 2, 3], dtype=np.int32), np.array([0, 1, 2], dtype=np.int32), True)
+    columns = np.asfortranarray([[1.0, 2.0, 3.0], [5.0, 5.0, 5.0]])
+    np.testing.assert_allclose(solver.solve(np.array([2, 3, 4]), columns[0]), [0.5, 2.0 / 3.0, 0.75], rtol=1e-12)

@@ -68,6 +68,8 @@ class PardisoSolver:
         return self._call(_SOLVE, self._values, rhs)
 
     def _call(self, phase: int, values: Array, rhs: Array) -> Array:
+        # MKL gets bare addresses: a strided view would be read as if it were not one.
+        values, rhs = (np.ascontiguousarray(array, dtype=float) for array in (values, rhs))
         solution = np.zeros(self._size)
         error = _pardiso(
             self._handle, self._type, phase, self._size, values, self._indptr, self._indices, self._iparm, rhs, solution
