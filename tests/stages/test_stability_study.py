@@ -113,7 +113,8 @@ def test_study_is_met_only_if_nearly_all_converge_and_none_is_wrong() -> None:
     assert summary(good + lost)[0][0].startswith("Met: 200 of 201")
     assert summary(good + 3 * lost)[0][0].startswith("Not met")
     assert summary([*good, row("wrong", checks_passed=False)])[0][0].startswith("Not met")
-    _, sections = summary(good + lost)
+    first, sections = summary(good + lost)
+    assert "each listed below: lost." in first[1]
     assert sections[0].rows == [["lost", "linear", "0.49", "0.5", "5", "1", "flat", "0", "runs away"]]
 
 

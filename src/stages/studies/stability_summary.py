@@ -14,6 +14,10 @@ MOST_RATIO = 1.3
 TREND_SHARE = 0.15
 """Largest change of force and of the breast's extent from the second finest to the finest mesh."""
 FACTORS = ("material", "nu", "compression", "elements", "contrast", "shape", "friction")
+_AGAIN = (
+    "python -m stages run stability_batch --case cohort --row batch=0 --out again.h5 --settings "
+    """'{"batches": 1, "only": ["%s"]}'"""
+)
 
 
 def with_mesh_trend(rows: list[Row]) -> list[Row]:
@@ -47,6 +51,8 @@ def summary(rows: Sequence[Row]) -> tuple[list[str], list[Section]]:
             else f"; iterations at nu {WORST:g} are {ratio:.2f} times those at {ORDINARY:g} (asked {MOST_RATIO:g})"
         )
     ]
+    if lost := [row["scenario"] for row in ran if not (row["converged"] and row["checks_passed"])]:
+        first.append(f"Missed, each listed below: {', '.join(lost)}. One of them again: {_AGAIN % lost[0]}")
     if len(ran) < len(rows):
         first.append(f"{len(rows) - len(ran)} of {len(rows)} scenarios did not run; the last table says why.")
     return first, _sections(rows, ran, solved)
