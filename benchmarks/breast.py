@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.boundary import BackCondition, held_back
-from mammoreg.fem.closing import Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackCondition, held_back
+from mammoreg.fem.plates.closing import Closing, ClosingOptions
 from mammoreg.materials.elastic import neo_hookean
 from mammoreg.meshing.block import BlockMesh
 

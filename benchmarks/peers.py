@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.breast import HEIGHT_MM, MU_KPA, POISSON, Body
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.materials.elastic import bulk_ratio, neo_hookean
 
 PENALTY_N_PER_MM3 = 1.0

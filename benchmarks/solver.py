@@ -46,8 +46,8 @@ Row = dict[str, str]
 
 def run_ours(elements: int, compression: float) -> Row:
     """Close the plates once; total time is that of this process from its start, interpreter and imports included."""
-    from mammoreg.fem.linear import pypardiso
-    from mammoreg.fem.nested import close_nested
+    from mammoreg.fem.linear.direct import pypardiso
+    from mammoreg.fem.plates.nested import close_nested
 
     body = breast(elements)
     start = time.perf_counter()

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.contact.soft import SoftMemory
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.damped_state import DampedState
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.plates.state import DampedState
 from stages.artefact import Artefact
 from stages.contract import Array, Value
 from stages.mechanics import Mechanics, PlacedBreast, place_breast

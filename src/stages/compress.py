@@ -8,7 +8,7 @@ from pydantic import Field
 
 from mammoreg.contact.soft import touching
 from mammoreg.errors import DataError
-from mammoreg.fem.closing import Closed, ClosingOptions
+from mammoreg.fem.plates.closing import Closed, ClosingOptions
 from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.meshing.block import BlockMesh
 from stages.artefact import Artefact

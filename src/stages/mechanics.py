@@ -7,14 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from mammoreg.fem.boundary import BackCondition, back_condition
-from mammoreg.fem.closing import Moving
-from mammoreg.fem.gravity import Gravity, gravity
-from mammoreg.fem.membrane import SKIN_THICKNESS_MM
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.parts import Part
-from mammoreg.fem.skin import SkinModel, SkinName, skin_model
-from mammoreg.fem.skin_law import SKIN_MODULUS_KPA, TensionLinear
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackCondition, back_condition
+from mammoreg.fem.parts.gravity import Gravity, gravity
+from mammoreg.fem.parts.part import Part
+from mammoreg.fem.plates.closing import Moving
+from mammoreg.fem.skin.law import SKIN_MODULUS_KPA, TensionLinear
+from mammoreg.fem.skin.membrane import SKIN_THICKNESS_MM
+from mammoreg.fem.skin.models import SkinModel, SkinName, skin_model
 from mammoreg.geometry import breast_to_plate
 from mammoreg.meshing.block import BlockMesh
 from stages.contract import SettingsModel

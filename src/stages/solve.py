@@ -3,8 +3,8 @@
 import numpy as np
 from pydantic import Field
 
-from mammoreg.fem.equilibrium import NewtonOptions
-from mammoreg.fem.prescribed import PrescribedOptions, solve_prescribed
+from mammoreg.fem.prescribed.equilibrium import NewtonOptions
+from mammoreg.fem.prescribed.solve import PrescribedOptions, solve_prescribed
 from stages.closing import placed_again
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject
 from stages.solving import report_values, seconds_text

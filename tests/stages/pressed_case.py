@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from mammoreg.fem.closing import ClosingOptions
+from mammoreg.fem.plates.closing import ClosingOptions
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate, lps_to_breast
 from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.deformation import MeshDeformation, ReferenceMesh

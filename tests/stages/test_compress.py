@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mammoreg.fem.ties import PlaneTies
+from mammoreg.fem.parts.plane_ties import PlaneTies
 from mammoreg.geometry import breast_to_plate
 from stages import tissue_map
 from stages.artefact import Artefact

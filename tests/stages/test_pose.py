@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.closing import Closing
+from mammoreg.fem.plates.closing import Closing
 from mammoreg.geometry.frames import plate_rotation
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MIDDLE, ROW, pressed, run, write_mammogram, write_start
 

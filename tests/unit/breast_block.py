@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mammoreg.fem.boundary import BackCondition, held_back
-from mammoreg.fem.closing import Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackCondition, held_back
+from mammoreg.fem.plates.closing import Closing, ClosingOptions
 from mammoreg.materials.elastic import ElasticMaterial, neo_hookean
 from mammoreg.meshing.block import BlockMesh
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.parts import Part
+from mammoreg.fem.parts.part import Part
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.surface import ContactSurface
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.boundary import BackName, back_condition
-from mammoreg.fem.closing import COARSE, Closed, Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackName, back_condition
+from mammoreg.fem.plates.closing import COARSE, Closed, Closing, ClosingOptions
 from mammoreg.materials.elastic import neo_hookean
 from mammoreg.meshing.block import BlockMesh
 from tests.unit.fe_bodies import block

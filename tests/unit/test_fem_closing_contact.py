@@ -6,11 +6,11 @@ import pytest
 from mammoreg.contact.soft import SoftContact
 from mammoreg.contact.surface import ContactSurface
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.boundary import BackCondition, back_condition, held_back
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.gravity import STANDARD_GRAVITY, gravity
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackCondition, back_condition, held_back
+from mammoreg.fem.parts.gravity import STANDARD_GRAVITY, gravity
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block
 

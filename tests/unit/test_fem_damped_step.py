@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import back_condition
-from mammoreg.fem.closing import Closing, ClosingOptions
-from mammoreg.fem.damped_state import DampedState, Load
-from mammoreg.fem.damped_step import DampedStep
-from mammoreg.fem.gravity import gravity
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import back_condition
+from mammoreg.fem.parts.gravity import gravity
+from mammoreg.fem.plates.closing import Closing, ClosingOptions
+from mammoreg.fem.plates.state import DampedState, Load
+from mammoreg.fem.plates.step import DampedStep
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block
 

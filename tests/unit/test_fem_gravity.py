@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import held_back
-from mammoreg.fem.gravity import STANDARD_GRAVITY, gravity
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import held_back
+from mammoreg.fem.parts.gravity import STANDARD_GRAVITY, gravity
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block, distorted
 

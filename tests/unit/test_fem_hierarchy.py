@@ -6,8 +6,8 @@ import scipy.sparse as sp
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mammoreg.fem.hierarchy import Hierarchy, block_size, interpolate_elements, interpolation
-from mammoreg.fem.system import node_dofs
+from mammoreg.fem.linear.hierarchy import Hierarchy, block_size, interpolate_elements, interpolation
+from mammoreg.fem.linear.system import node_dofs
 from mammoreg.meshing.block import BlockMesh
 from tests.unit.breast_block import breast_block
 

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem import linear, saddle
-from mammoreg.fem.hierarchy import Hierarchy
-from mammoreg.fem.krylov import fgmres
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.system import NewtonSystem
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.linear import direct as linear
+from mammoreg.fem.linear import saddle
+from mammoreg.fem.linear.hierarchy import Hierarchy
+from mammoreg.fem.linear.krylov import fgmres
+from mammoreg.fem.linear.system import NewtonSystem
 from mammoreg.materials.elastic import ElasticMaterial, neo_hookean
 from tests.unit.breast_block import breast_block, breast_closing, sliding_back
 

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.linear import PardisoSolver, SuperLuSolver
-from mammoreg.fem.sparse import Assembler
+from mammoreg.fem.linear.direct import PardisoSolver, SuperLuSolver
+from mammoreg.fem.linear.sparse import Assembler
 
 
 @given(st.integers(0, 1000), st.booleans())

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mammoreg.fem.linear_elastic import LinearElasticBody
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.linear_elastic import LinearElasticBody
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.elastic import neo_hookean
 from mammoreg.meshing.block import BlockMesh
 

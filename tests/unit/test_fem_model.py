@@ -5,9 +5,9 @@ import pytest
 import skfem
 from numpy.typing import NDArray
 
-from mammoreg.fem.hexahedra import VTK_IN_SKFEM, hexahedra, jacobians, skfem_basis
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
+from mammoreg.fem.elements.hexahedra import VTK_IN_SKFEM, hexahedra, jacobians, skfem_basis
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.catalogue import CATALOGUE, SKIN
 from mammoreg.materials.elastic import ElasticMaterial, hyperelastic, neo_hookean
 from mammoreg.materials.fibres import Fibres

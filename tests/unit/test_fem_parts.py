@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mammoreg.fem.boundary import back_condition, held_back
-from mammoreg.fem.closing import Closing
-from mammoreg.fem.damped import DampedEquilibrium
-from mammoreg.fem.gravity import gravity
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.parts import BackSprings, Part, all_nodes, back_springs, parts_at
-from mammoreg.fem.point_ties import point_ties
-from mammoreg.fem.prescribed import solve_prescribed
-from mammoreg.fem.system import node_dofs
-from mammoreg.fem.ties import PlaneTies
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.linear.system import node_dofs
+from mammoreg.fem.parts.back import back_condition, held_back
+from mammoreg.fem.parts.gravity import gravity
+from mammoreg.fem.parts.part import BackSprings, Part, all_nodes, back_springs, parts_at
+from mammoreg.fem.parts.plane_ties import PlaneTies
+from mammoreg.fem.parts.point_ties import point_ties
+from mammoreg.fem.plates.closing import Closing
+from mammoreg.fem.plates.damped import DampedEquilibrium
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block
 

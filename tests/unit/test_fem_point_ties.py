@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import back_condition
-from mammoreg.fem.closing import Closing
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.point_ties import point_ties
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import back_condition
+from mammoreg.fem.parts.point_ties import point_ties
+from mammoreg.fem.plates.closing import Closing
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block
 

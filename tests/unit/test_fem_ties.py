@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mammoreg.fem.ties import PlaneTies
+from mammoreg.fem.parts.plane_ties import PlaneTies
 
 
 def _ties(count: int = 5) -> tuple[PlaneTies, np.ndarray]:

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mammoreg.fem.membrane import Membrane
-from mammoreg.fem.membrane_invariants import full_invariant, relaxed_invariant
-from mammoreg.fem.skin_law import TensionLinear
+from mammoreg.fem.skin.invariants import full_invariant, relaxed_invariant
+from mammoreg.fem.skin.law import TensionLinear
+from mammoreg.fem.skin.membrane import Membrane
 from mammoreg.materials.neo_hookean import NeoHookean
 from tests.unit.fe_bodies import block, rotation
 from tests.unit.membranes import assembled, assert_energy_force_and_stiffness_agree, relaxed, sheet

@@ -12,14 +12,14 @@ import pytest
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact
 from mammoreg.contact.surface import ContactSurface
-from mammoreg.fem.boundary import held_back
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.linear import PardisoSolver, SuperLuSolver
-from mammoreg.fem.linear_elastic import LinearElasticBody
-from mammoreg.fem.membrane import Membrane
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
-from mammoreg.fem.skin import SkinName, skin_model
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.linear.direct import PardisoSolver, SuperLuSolver
+from mammoreg.fem.parts.back import held_back
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.prescribed.linear_elastic import LinearElasticBody
+from mammoreg.fem.prescribed.solve import solve_prescribed
+from mammoreg.fem.skin.membrane import Membrane
+from mammoreg.fem.skin.models import SkinName, skin_model
 from mammoreg.materials.elastic import ElasticMaterial, hyperelastic, neo_hookean
 from mammoreg.materials.exponential import Exponential
 from mammoreg.materials.fibres import Fibres

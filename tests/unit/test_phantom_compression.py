@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mammoreg.contact.plate import Plate
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.materials.elastic import neo_hookean
 from mammoreg.phantom import patient as drawing
 from mammoreg.phantom.barrier import barrier_force, barrier_stiffness

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.meshing.quality import scaled_jacobians
 from mammoreg.meshing.trilinear import GAUSS_POINTS, volumes
 from mammoreg.scenes.bodies import BODIES, body_mesh

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import back_condition
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import back_condition
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.geometry import ViewGeometry
 from mammoreg.materials.elastic import neo_hookean
 from mammoreg.meshing.skin import skin_facets

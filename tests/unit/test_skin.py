@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import back_condition
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.membrane import Membrane
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
-from mammoreg.fem.skin import SkinModel, rim_nodes, skin_model
-from mammoreg.fem.skin_interface import SkinInterface, skin_interface
-from mammoreg.fem.skin_law import TensionLinear
-from mammoreg.fem.skin_surface import QuadSurface
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import back_condition
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.prescribed.solve import solve_prescribed
+from mammoreg.fem.skin.interface import SkinInterface, skin_interface
+from mammoreg.fem.skin.law import TensionLinear
+from mammoreg.fem.skin.membrane import Membrane
+from mammoreg.fem.skin.models import SkinModel, rim_nodes, skin_model
+from mammoreg.fem.skin.surface import QuadSurface
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.block_meshes import half_ellipsoid
 from tests.unit.fe_bodies import block, rotation

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.equilibrium import Equilibrium, NewtonOptions, State
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, State
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.boundary import BackCondition, held_back
+from mammoreg.fem.parts.back import BackCondition, held_back
 from tests.shared_data import DATA
 
 Floats = NDArray[np.float64]

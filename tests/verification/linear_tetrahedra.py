@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.linear import linear_solver
-from mammoreg.fem.sparse import Assembler
+from mammoreg.fem.linear.direct import linear_solver
+from mammoreg.fem.linear.sparse import Assembler
 from mammoreg.materials.elastic import bulk_ratio
 from tests.verification.niftysim import LOWER_MM, MU_KPA, UPPER_MM, WEIGHT, ChestTurn, PendantBreast
 

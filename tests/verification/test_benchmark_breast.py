@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from benchmarks.breast import breast
 from benchmarks.peers import PEERS, febio_counts, febio_force_n
-from mammoreg.fem.nested import close_nested
+from mammoreg.fem.plates.nested import close_nested
 from tests.shared_data import DATA, requires_shared
 
 FORCES_N = {0.21: 15.747, 0.5: 110.890}

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.elastic import neo_hookean
 from tests.shared_data import requires_shared
 from tests.verification.febio import HEIGHT_MM, HalfEllipsoid, half_ellipsoid

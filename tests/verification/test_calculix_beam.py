@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mammoreg.fem.equilibrium import NewtonOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.equilibrium import NewtonOptions
 from mammoreg.materials.elastic import ElasticMaterial
 from tests.verification.calculix import Deck, read_deck, requires_ccx, run_ccx
 from tests.verification.closed_forms import uniaxial

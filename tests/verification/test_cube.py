@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mammoreg.fem.boundary import held_back
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.cube import press_cube
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import solve_prescribed
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import held_back
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
+from mammoreg.fem.prescribed.cube import press_cube
+from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.catalogue import CATALOGUE, Tissue
 from mammoreg.materials.cube import CUBE_MM3, HIGH_COMPRESSION, LOW_COMPRESSION, cube_force_n
 from mammoreg.materials.elastic import bulk_ratio, hyperelastic, neo_hookean, tangent_bulk_kpa

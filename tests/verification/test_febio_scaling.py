@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import held_back
-from mammoreg.fem.closing import Closed
+from mammoreg.fem.parts.back import held_back
+from mammoreg.fem.plates.closing import Closed
 from tests.shared_data import DATA, requires_shared
 from tests.verification.febio import HalfEllipsoid, boundary_faces, half_ellipsoid
 from tests.verification.hex_bodies import subdivided

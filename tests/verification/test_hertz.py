@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mammoreg.fem.boundary import held_back
-from mammoreg.fem.closing import Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import held_back
+from mammoreg.fem.plates.closing import Closing, ClosingOptions
 from mammoreg.materials.elastic import neo_hookean
 from tests.verification.equilibria import on
 from tests.verification.febio import boundary_faces

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.materials.catalogue import CATALOGUE
 from mammoreg.materials.elastic import ElasticMaterial, hyperelastic, neo_hookean
 from mammoreg.materials.exponential import Exponential

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mammoreg.fem.equilibrium import NewtonOptions
-from mammoreg.fem.linear_elastic import LinearElasticBody
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.equilibrium import NewtonOptions
+from mammoreg.fem.prescribed.linear_elastic import LinearElasticBody
 from mammoreg.materials.elastic import ElasticMaterial, bulk_ratio, hyperelastic, neo_hookean
 from mammoreg.materials.exponential import Exponential
 from tests.verification.closed_forms import Slope, slope_of_uniaxial, sphere_pressure

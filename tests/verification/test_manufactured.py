@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mammoreg.fem.equilibrium import NewtonOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.equilibrium import NewtonOptions
 from mammoreg.materials.elastic import bulk_ratio, neo_hookean
 from mammoreg.meshing.trilinear import GAUSS_POINTS, jacobians, shape_functions, shape_gradients
 from tests.verification.equilibria import DeadForces, solve

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mammoreg.fem.boundary import held_back
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.gravity import STANDARD_GRAVITY, gravity
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import held_back
+from mammoreg.fem.parts.gravity import STANDARD_GRAVITY, gravity
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.materials.elastic import ElasticMaterial, bulk_ratio
 from mammoreg.meshing.locate import Locator, interpolate
 from tests.shared_data import requires_shared

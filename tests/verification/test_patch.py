@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mammoreg.fem.equilibrium import NewtonOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.prescribed.equilibrium import NewtonOptions
 from mammoreg.materials.elastic import ElasticMaterial, bulk_ratio, neo_hookean
 from tests.verification.equilibria import face_forces, solve
 from tests.verification.febio import boundary_faces

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mammoreg.fem.boundary import BackCondition, held_back
-from mammoreg.fem.closing import Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.prescribed import PrescribedOptions, PrescribedResult, solve_prescribed
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackCondition, held_back
+from mammoreg.fem.plates.closing import Closing, ClosingOptions
+from mammoreg.fem.prescribed.solve import PrescribedOptions, PrescribedResult, solve_prescribed
 from mammoreg.materials.elastic import ElasticMaterial, hyperelastic, neo_hookean
 from mammoreg.materials.exponential import Exponential
 from mammoreg.materials.fibres import Fibres

@@ -5,9 +5,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.parts import Part
-from mammoreg.fem.sparse import Array
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.linear.sparse import Array
+from mammoreg.fem.parts.part import Part
 
 
 @dataclass(frozen=True)

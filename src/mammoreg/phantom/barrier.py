@@ -8,7 +8,7 @@ corner of an element turns inside out.
 
 import numpy as np
 
-from mammoreg.fem.model import ElementState
+from mammoreg.fem.elements.model import ElementState
 from mammoreg.phantom.shape import Array
 
 

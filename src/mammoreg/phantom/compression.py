@@ -6,9 +6,9 @@ import numpy as np
 
 from mammoreg.contact.plate import Plate
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.linear import linear_solver
-from mammoreg.fem.model import HyperelasticModel
-from mammoreg.fem.sparse import Assembler
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.linear.direct import linear_solver
+from mammoreg.fem.linear.sparse import Assembler
 from mammoreg.geometry import breast_to_plate
 from mammoreg.phantom.anatomy import Anatomy
 from mammoreg.phantom.barrier import barrier_force, barrier_stiffness

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mammoreg.fem.closing import Closed
+from mammoreg.fem.plates.closing import Closed
 from mammoreg.scenes.gland import Floats
 from mammoreg.scenes.inner_forces import InnerForces, least_corner_jacobian
 from mammoreg.scenes.outer_forces import PlateFace, Pressed

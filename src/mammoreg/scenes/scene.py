@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.boundary import BackCondition, back_condition
-from mammoreg.fem.closing import Closed, Closing, ClosingOptions
-from mammoreg.fem.model import HyperelasticModel
+from mammoreg.fem.elements.model import HyperelasticModel
+from mammoreg.fem.parts.back import BackCondition, back_condition
+from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.scenes.gland import Floats, gland_share
 from mammoreg.scenes.scenario import Scenario

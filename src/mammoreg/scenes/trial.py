@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.closing import Closed
+from mammoreg.fem.plates.closing import Closed
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.scenes.checks import Check, min_jacobian, outside_checks
 from mammoreg.scenes.scenario import Scenario

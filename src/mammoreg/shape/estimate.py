@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.closing import Closed, Closing
-from mammoreg.fem.ties import PlaneTies
+from mammoreg.fem.parts.plane_ties import PlaneTies
+from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import SkinFacets

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.closing import COARSE, ClosingOptions
+from mammoreg.fem.plates.closing import COARSE, ClosingOptions
 from mammoreg.geometry import ViewGeometry
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.estimate import Compressed

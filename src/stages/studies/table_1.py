@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.cube import Faces, press_cube
+from mammoreg.fem.prescribed.cube import Faces, press_cube
 from mammoreg.materials.catalogue import CATALOGUE, Tissue
 from mammoreg.materials.cube import HIGH_COMPRESSION, LOW_COMPRESSION, cube_force_n
 from mammoreg.materials.elastic import tangent_bulk_kpa

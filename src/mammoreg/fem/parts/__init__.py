@@ -1,0 +1,1 @@
+"""What acts on a body beside its elements and plates: its back, ties, gravity."""

@@ -1,0 +1,221 @@
+"""One implicit step of a damped equilibrium: Newton's method, kept downhill where it does not contract by itself.
+
+Far from an equilibrium Newton's updates bounce between contact and release, or follow a buckling body uphill. An
+update that is not clearly smaller than the last one is therefore searched along until a merit lessens: the potential
+of everything that acts, the volume's part at a moderate bulk modulus beside the pressures at hand (an augmented
+Lagrangian). With the true modulus every finite update would seem to go uphill, for it keeps the volume to first order
+only. Where an update points uphill the tangent is not positive definite; more damping towards the place at hand makes
+it so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from mammoreg.contact.plate import Plate
+from mammoreg.contact.soft import SoftContact, SoftTerms
+from mammoreg.errors import NotConvergedError
+from mammoreg.fem.elements.model import HyperelasticModel, Residual
+from mammoreg.fem.linear.sparse import Array
+from mammoreg.fem.linear.system import NewtonSystem
+from mammoreg.fem.parts.part import Parts
+from mammoreg.fem.plates.state import DampedState, Load
+from mammoreg.fem.report import Stopwatch
+
+LEAST_DET_SHARE = 0.2  # a Newton step may shrink the smallest det F to this share of itself
+RUNAWAY_MM = 200.0
+CONTRACTING = 0.6  # an update above this share of the last one is searched along
+PLAIN_ITERATIONS, ITERATIONS = 14, 40
+MERIT_BULK = 20.0  # bulk modulus of the merit at most, in shear moduli
+LARGEST_MM = 30.0  # of a searched update
+DESCENT = 1e-4  # share of the expected descent that is enough
+SHORTEST = 1.0 / 64.0
+SHIFT, LEAST_SHIFT, SHIFT_GROWTH, SHIFTS = 0.1, 0.01, 5.0, 8
+SHORT = 0.2
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Forces at a state: the elements' residual, and residual and tangent of each group of blocks."""
+
+    internal: Residual
+    vectors: list[Array]
+    blocks: list[Array]
+
+
+class StepEquations(Protocol):
+    """What a step takes from its equilibrium: body, linear system, contact, springs of the back, record."""
+
+    model: HyperelasticModel
+    system: NewtonSystem
+    watch: Stopwatch
+    contact: SoftContact
+    springs: Parts
+    weight: Array
+    residuals: list[float]
+
+    def terms(self, state: DampedState, plates: Sequence[Plate]) -> SoftTerms:
+        """Contact at a state."""
+
+
+class DampedStep:
+    """The equations of one step.
+
+    Args:
+        equilibrium: body, contact and linear system.
+        start: state towards which the step is damped.
+        load: plates.
+        acting: parts at their share of the load, the back's springs first.
+        damping: factor of the damping.
+    """
+
+    def __init__(
+        self, equilibrium: StepEquations, start: DampedState, load: Load, acting: Parts, damping: float
+    ) -> None:
+        self.equilibrium, self.start, self.load, self.acting, self.damping = equilibrium, start, load, acting, damping
+        self.model, self.system, self.watch = equilibrium.model, equilibrium.system, equilibrium.watch
+        self.shift = 0.0
+
+    def solve(self, tolerance_mm: float) -> tuple[DampedState, str]:
+        """Iterate until an update is below the tolerance.
+
+        Returns:
+            The state, and why it is not yet an equilibrium of the step, empty if it is.
+
+        Raises:
+            NotConvergedError: elements turn inside out.
+        """
+        state, last = self.start, np.inf
+        for iteration in range(ITERATIONS):
+            balance = self._balance(state)
+            self.equilibrium.residuals.append(self.system.unbalance(balance.vectors))
+            update, pressure = self._update(balance)
+            largest, settles = float(np.abs(update).max()), self.shift == 0.0
+            share = self._plain_share(state, update, largest, last) if iteration < PLAIN_ITERATIONS else 0.0
+            if share > 0.0:
+                state = _moved(state, share, update, pressure)
+            else:
+                state = self._searched(state, balance, update, pressure)
+            if settles and largest < tolerance_mm:
+                return state, ""
+            last = largest
+        return state, f"no equilibrium within {ITERATIONS} Newton iterations (last update {last:.2g} mm)"
+
+    def _plain_share(self, state: DampedState, update: Array, largest: float, last: float) -> float:
+        """Share of an update that goes as it is; 0: it has to be searched along."""
+        if self.shift > 0.0 or largest > RUNAWAY_MM or largest > CONTRACTING * last:
+            return 0.0
+        try:
+            share = self.system.admissible(state.positions, update, LEAST_DET_SHARE)
+        except NotConvergedError:
+            return 0.0
+        return share if np.isinf(last) or share == 1.0 else 0.0
+
+    def _balance(self, state: DampedState) -> Balance:
+        with self.watch.timing("contact"):
+            contact = self.equilibrium.terms(state, self.load.plates)
+        with self.watch.timing("assembly"):
+            elements = self.model.state(state.positions)
+            internal = self.model.residual(elements, state.pressure)
+            tangent = self.model.stiffness(elements, state.pressure, internal.coupling)
+            pairs = [part.terms(state.positions) for part in self.acting]
+        weight, count = self.damping * self.equilibrium.weight, len(self.equilibrium.springs)
+        damped = (weight * self._way(state))[:, None], weight[:, None, None]
+        groups = [(internal.force, tangent), *pairs[:count], (contact.force, contact.stiffness), damped, *pairs[count:]]
+        return Balance(internal, [vector for vector, _ in groups], [block for _, block in groups])
+
+    def unbalance(self, state: DampedState) -> float:
+        """Ratio of unbalanced to internal forces at a state."""
+        return self.system.unbalance(self._balance(state).vectors)
+
+    def _way(self, state: DampedState) -> Array:
+        """Displacement (total,) since the start."""
+        return np.append((state.positions - self.start.positions).ravel(), state.height - self.start.height)
+
+    def _searched(self, state: DampedState, balance: Balance, update: Array, pressure: Array) -> DampedState:
+        """The state after a part of an update that lessens the merit, damped more until there is one."""
+        gradient = self._gradient(balance)
+        merit = self._merit(state.positions, state.height, state.pressure)
+        for _ in range(SHIFTS):
+            slope = float(gradient @ update)
+            with self.watch.timing("search"):
+                share = self._descending(state, update, slope, merit) if slope < 0.0 else 0.0
+            if share > 0.0:
+                self._adapt(share)
+                return _moved(state, share, update, pressure)
+            self.shift = max(SHIFT_GROWTH * self.shift, SHIFT)
+            update, pressure = self._update(balance)
+        raise NotConvergedError(self._blame(state, update))
+
+    def _adapt(self, share: float) -> None:
+        """More damping towards the place at hand after a short step, less after a whole one."""
+        if share < SHORT:
+            self.shift = max(SHIFT_GROWTH * self.shift, SHIFT)
+        elif share == 1.0:
+            self.shift = self.shift / SHIFT_GROWTH if self.shift > LEAST_SHIFT else 0.0
+
+    def _update(self, balance: Balance) -> tuple[Array, Array]:
+        """Newton's update, with more damping towards the present place where that has turned out to be needed."""
+        blocks = list(balance.blocks)
+        if self.shift > 0.0:
+            place = len(self.equilibrium.springs) + 2
+            blocks[place] = blocks[place] + self.shift * self.equilibrium.weight[:, None, None]
+        with self.watch.timing("linear"):
+            return self.system.increment(balance.internal, balance.vectors, blocks)
+
+    def _descending(self, state: DampedState, update: Array, slope: float, merit: float) -> float:
+        """Share of an update at which the merit has lessened; 0: there is none."""
+        before = self.model.determinants(state.positions)
+        share = min(1.0, LARGEST_MM / float(np.abs(update).max()))
+        while share > SHORTEST:
+            positions = state.positions + share * update[:-1].reshape(-1, 3)
+            if (self.model.determinants(positions) > LEAST_DET_SHARE * before).all():
+                found = self._merit(positions, state.height + share * float(update[-1]), state.pressure)
+                if found <= merit + DESCENT * share * slope + 1e-12 * abs(merit):
+                    return share
+            share *= 0.5
+        return 0.0
+
+    def _soft_bulk(self) -> Array:
+        """Stiffness (E,) of the merit's volume term, kPa/mm3: as of the bulk modulus in series with a moderate one."""
+        material = self.model.material
+        moderate = MERIT_BULK * material.mu_kpa
+        return np.asarray(material.bulk_kpa * moderate / (material.bulk_kpa + moderate) / self.model.volume)
+
+    def _gradient(self, balance: Balance) -> Array:
+        """Gradient (total,) of the merit, mN."""
+        internal = balance.internal
+        volumetric = (self._soft_bulk() * internal.volume)[:, None] * internal.coupling
+        return self.system.sum([balance.vectors[0] + volumetric, *balance.vectors[1:]])
+
+    def _merit(self, positions: Array, height: float, pressure: Array) -> float:
+        """Potential, mN mm, of nodes (N, 3) at element pressures (E,)."""
+        contact = self.equilibrium.contact.energy_mj(positions, height, self.load.plates, self.start.memory)
+        stored = self.model.energy_mj(positions) + contact + sum(part.energy_mj(positions) for part in self.acting)
+        grown = (self.model.weights * (self.model.determinants(positions) - 1.0)).sum(axis=1)
+        excess = grown - pressure / self.model.bulk_per_volume
+        volume = float(np.sum(pressure * grown + 0.5 * self._soft_bulk() * excess**2))
+        way = np.append((positions - self.start.positions).ravel(), height - self.start.height)
+        return 1e3 * stored + volume + 0.5 * self.damping * float(self.equilibrium.weight @ way**2)
+
+    def _blame(self, state: DampedState, update: Array) -> str:
+        """Which element is the first to turn inside out along an update, or that none is."""
+        before = self.model.determinants(state.positions)
+        after = self.model.determinants(state.positions + SHORTEST * update[:-1].reshape(-1, 3))
+        worst = int(np.argmin((after / before).min(axis=1)))
+        medial, posterior, height = state.positions[self.model.hexes[worst]].mean(axis=0)
+        place = f"element {worst} (medial {medial:.0f}, posterior {posterior:.0f}, height {height:.0f} mm)"
+        if after[worst].min() <= LEAST_DET_SHARE * before[worst].min():
+            return f"{place} turns inside out"
+        return f"no way downhill; most strained is {place} with det F {before[worst].min():.2g}"
+
+
+def _moved(state: DampedState, share: float, update: Array, pressure: Array) -> DampedState:
+    return replace(
+        state,
+        positions=state.positions + share * update[:-1].reshape(-1, 3),
+        pressure=state.pressure + share * pressure,
+        height=state.height + share * float(update[-1]),
+    )
