@@ -21,7 +21,7 @@ _LAW_NAMES = {
     "stiffening_fibres": "stiffening fibres",
 }
 _FAILED, _WRONG = "#c2185b", "#e69f00"
-_FEWEST, _MOST = 30, 600
+_FEWEST, _MOST = 30, 1200
 
 
 def stability_map(rows: Sequence[Row]) -> Png:
@@ -108,9 +108,9 @@ def _mark(axes: Axes, x: float, y: float, row: Row) -> None:
 
 def _legend(figure: Any, rows: Sequence[Row], panels: Any) -> None:
     scale = figure.colorbar(
-        _scalar_map(), ax=panels, location="right", shrink=0.5, pad=0.02, ticks=[30, 50, 100, 200, 400]
+        _scalar_map(), ax=panels, location="right", shrink=0.5, pad=0.02, ticks=[30, 50, 100, 200, 400, 800]
     )
-    scale.ax.set_yticklabels(["30", "50", "100", "200", "400"])
+    scale.ax.set_yticklabels(["30", "50", "100", "200", "400", "800"])
     scale.ax.minorticks_off()
     scale.set_label("Newton iterations of the whole closing")
     shapes = [name for name in _MARKERS if any(row["shape"] == name for row in rows)]
