@@ -1,11 +1,11 @@
 """Mechanics that the stages pose, compress and solve share: settings, model and back of a breast in the plate frame."""
 
 from dataclasses import dataclass
-from typing import Literal, Self
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.parts.back import BackCondition, back_condition
@@ -28,22 +28,24 @@ class Mechanics(SettingsModel):
     """Tissue, plates and the condition at the breast's back."""
 
     material: MaterialName = Field(
-        "homogeneous",
-        description="homogeneous: neo-Hookean, scaled by `calibrate`; else fat and gland as segmented, mixed in each "
-        "element, by that one of the paper's models (Table II), whose stiffness is its own",
+        "fat_and_gland",
+        description="fat_and_gland: neo-Hookean, mixed in each element as segmented, their mean scaled by `calibrate`; "
+        "homogeneous: one neo-Hookean tissue, the paper's choice; else fat and gland by that one of the paper's models "
+        "(Table II), whose stiffness is its own",
     )
     poisson_ratio: float = Field(
         0.495,
         ge=0.3,
         le=0.4999,
-        description="Poisson's ratio of breast tissue: gives the bulk modulus, of another material than homogeneous "
-        "for each tissue's stiffness at the view's compression",
+        description="Poisson's ratio of breast tissue: gives the bulk modulus, of one of the paper's models for each "
+        "tissue's stiffness at the view's compression",
     )
     gland_contrast: float = Field(
-        1.0,
+        3.4,
         ge=0.1,
         le=1000.0,
-        description="shear modulus of gland over fat in homogeneous material; 1 is the paper's homogeneous tissue",
+        description="shear modulus of gland over fat in material fat_and_gland; 3.4 is the ratio of Wellman's initial "
+        "moduli, 15.1 and 4.46 kPa",
     )
     fibre_ratio: float = Field(
         1.0,
@@ -100,16 +102,7 @@ class Mechanics(SettingsModel):
     @property
     def tells_gland_from_fat(self) -> bool:
         """Whether the material needs the tissue map."""
-        return self.material != "homogeneous" or self.gland_contrast != 1.0
-
-    @model_validator(mode="after")
-    def _contrast_of_one_material(self) -> Self:
-        if self.material != "homogeneous" and self.gland_contrast != 1.0:
-            raise ValueError(
-                f"gland_contrast {self.gland_contrast:g} belongs to material homogeneous, but material is "
-                f"{self.material}, which knows its gland; leave gland_contrast at 1"
-            )
-        return self
+        return self.material != "homogeneous"
 
 
 @dataclass(frozen=True)
@@ -173,6 +166,8 @@ def _standing_up(model: HyperelasticModel, density_kg_m3: float, angle_deg: floa
 
 def _tissue(mechanics: Mechanics, mu_kpa: float, gland: Floats | None, compression: float) -> Tissue:
     if mechanics.material == "homogeneous":
+        return neo_hookean_tissue(mu_kpa, mechanics.poisson_ratio)
+    if mechanics.material == "fat_and_gland":
         return neo_hookean_tissue(mu_kpa, mechanics.poisson_ratio, mechanics.gland_contrast, gland)
     return catalogue_tissue(mechanics.material, mechanics.poisson_ratio, gland, compression)
 

@@ -13,8 +13,10 @@ from mammoreg.materials.laws import Law
 from mammoreg.materials.mixture import TissueMixture
 
 Floats = NDArray[np.float64]
-MaterialName = Literal["wellman", "azar", "samani", "homogeneous", "krouskop", "bakic", "lorenzen"]
-MATERIALS: tuple[MaterialName, ...] = get_args(MaterialName)
+PaperMaterial = Literal["wellman", "azar", "samani", "homogeneous", "krouskop", "bakic", "lorenzen"]
+MaterialName = PaperMaterial | Literal["fat_and_gland"]
+MATERIALS: tuple[PaperMaterial, ...] = get_args(PaperMaterial)
+"""Those of Table II."""
 
 
 @dataclass(frozen=True)

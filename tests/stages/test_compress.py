@@ -115,7 +115,7 @@ def test_fibres_along_the_nipple_axis_shorten_the_reach(inputs, tmp_path):
 
 
 def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, segment, plain, tmp_path):
-    contrasted = _with(inputs | {"segment": segment}, tmp_path, gland_contrast=6.0)
+    contrasted = _with(inputs | {"segment": segment}, tmp_path, material="fat_and_gland", gland_contrast=6.0)
     assert contrasted.value("force_n") == pytest.approx(plain.value("force_n"), rel=0.35)
     assert np.abs(_nodes(contrasted) - _nodes(plain)).max() > 0.2
 
@@ -127,12 +127,12 @@ def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain,
         alike = run("compress", tmp_path, told)
     np.testing.assert_array_equal(_nodes(alike), _nodes(plain))
     assert "gland_fraction" not in alike.names()
-    share = _with(told, tmp_path, gland_contrast=2.0).array("gland_fraction", "1")
+    share = _with(told, tmp_path, material="fat_and_gland", gland_contrast=2.0).array("gland_fraction", "1")
     assert len(share) == len(MESH.hexes())
     assert share.min() == 0.0
     assert share.max() > 0.3
     with pytest.raises(UserError, match="needs the input segment"):
-        _with(inputs, tmp_path, gland_contrast=2.0)
+        _with(inputs, tmp_path, material="fat_and_gland")
 
 
 @pytest.mark.parametrize("material", ["wellman", "bakic"])

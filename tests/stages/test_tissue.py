@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from mammoreg.materials.catalogue import CATALOGUE
 from mammoreg.materials.elastic import bulk_ratio
-from stages.config import read_config
-from stages.errors import FaultsError
 from stages.mechanics import Mechanics
 from stages.tissue import MATERIALS, catalogue_tissue, neo_hookean_tissue
 
@@ -69,15 +66,7 @@ def test_homogeneous_tissue_needs_no_map_and_a_contrast_keeps_the_mean():
 
 
 @pytest.mark.parametrize(
-    ("keys", "told"), [({}, False), ({"gland_contrast": 2.0}, True), ({"material": "lorenzen"}, True)]
+    ("keys", "told"), [({}, True), ({"material": "homogeneous"}, False), ({"material": "lorenzen"}, True)]
 )
 def test_only_these_need_the_tissue_map(keys, told):
     assert Mechanics(**keys).tells_gland_from_fat is told
-
-
-def test_settings_that_contradict_each_other_are_named():
-    with pytest.raises(ValidationError, match="belongs to material homogeneous, but material is azar"):
-        Mechanics(material="azar", gland_contrast=3.0)
-    wrong = {"compress": {"mechanics": {"material": "azar", "gland_contrast": 3.0}}}
-    with pytest.raises(FaultsError, match=r"key compress.mechanics.*leave gland_contrast at 1"):
-        read_config(wrong)

@@ -41,7 +41,8 @@ def methods_paragraph(artefacts: Sequence[Artefact]) -> str:
     versions = sorted({a.attrs["package_version"] for a in artefacts if "package_version" in a.attrs})
     settings = _mechanics_settings(artefacts)
     material = settings.get("material", "homogeneous")
-    tissue = "neo-Hookean" if material == "homogeneous" else f"hyperelastic (fat and gland after {material.title()})"
+    own = material in ("homogeneous", "fat_and_gland")
+    tissue = "neo-Hookean" if own else f"hyperelastic (fat and gland after {material.title()})"
     return METHODS_TEXT.format(
         version=", ".join(versions), elements=elements, tissue=tissue, mechanics=_mechanics(settings)
     )
@@ -54,7 +55,9 @@ def _mechanics_settings(artefacts: Sequence[Artefact]) -> dict[str, Any]:
 
 def _mechanics(settings: Mapping[str, Any]) -> str:
     """Tissue and plates of the compression in words."""
-    texts = [form.format(settings[key]) for key, form in _MECHANICS.items() if settings.get(key)]
+    told = settings.get("material") == "fat_and_gland"
+    kept = {key: settings.get(key) for key in _MECHANICS if told or key != "gland_contrast"}
+    texts = [_MECHANICS[key].format(value) for key, value in kept.items() if value]
     return ", ".join(texts) or "homogeneous"
 
 

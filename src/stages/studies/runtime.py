@@ -99,8 +99,8 @@ def _material(plan: Plan) -> str:
     """The material of the main run in words."""
     mechanics = plan.settings.get("compress", {}).get("mechanics", {})
     model = mechanics.get("material", "homogeneous")
-    contrasted = "homogeneous" if mechanics.get("gland_contrast", 1.0) == 1.0 else "gland and fat"
-    tissue = f"{contrasted} neo-Hookean" if model == "homogeneous" else model
+    words = {"homogeneous": "homogeneous neo-Hookean", "fat_and_gland": "fat and gland neo-Hookean"}
+    tissue = words.get(model, model)
     return f"{tissue}{' with fibres' if mechanics.get('fibre_ratio', 0.0) else ''}"
 
 

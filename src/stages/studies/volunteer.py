@@ -126,7 +126,7 @@ def _own(plan: Plan) -> Mechanics:
 
 
 def _paper_tissue(plan: Plan, settings: Settings) -> Mechanics:
-    plain = {"material": "homogeneous", "gland_contrast": 1.0, "skin": "none", "fibre_ratio": settings.fibre_ratio}
+    plain = {"material": "homogeneous", "skin": "none", "fibre_ratio": settings.fibre_ratio}
     return _own(plan).model_copy(update=plain)
 
 
