@@ -42,7 +42,7 @@ def run_case(given: Given, folder: Path, settings: Settings) -> dict[str, Artefa
     for view in views:
         image = {"image": given.images[view]} if view in given.images else {}
         pose = run("pose", {**base, "calibrate": calibrate, **image}, view)
-        compress = run("compress", {"mesh": mesh, "pose": pose, "calibrate": calibrate}, view)
+        compress = run("compress", {**base, "pose": pose, "calibrate": calibrate}, view)
         shape = run("shape", {"mesh": mesh, "pose": pose, "compress": compress}, view)
         solve = run("solve", {"mesh": mesh, "compress": compress, "shape": shape}, view)
         for name, path in (("pose", pose), ("compress", compress), ("solve", solve)):
