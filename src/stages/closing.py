@@ -43,7 +43,7 @@ def closing_plates(
     """Plates around a placed breast; `lower_mm` is the lower plate's height where a second volume shows it."""
     return Closing(
         breast.model,
-        breast.skin.contact_quads,
+        breast.contact_quads,
         breast.back,
         edge_p_mm if mechanics.plates_end else None,
         mechanics.lip_radius_mm,

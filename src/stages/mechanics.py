@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.parts.back import BackCondition, back_condition
+from mammoreg.fem.parts.back import BackCondition, BackName, back_condition
 from mammoreg.fem.parts.gravity import Gravity, gravity
 from mammoreg.fem.parts.part import Part
 from mammoreg.fem.plates.closing import Moving
@@ -79,10 +79,10 @@ class Mechanics(SettingsModel):
     plates_end: bool = Field(
         True, description="plates end at the image's chest-wall edge; false: they go on to the chest wall"
     )
-    back: Literal["fixed", "slide_compression", "slide_plane", "springs"] = Field(
-        "slide_compression",
-        description="chest-wall side of the breast: fixed; slide_compression, against the shear of "
-        "the tissue behind it along the plates' direction only; "
+    back: BackName = Field(
+        "shear_layer",
+        description="chest-wall side of the breast: fixed; shear_layer, held towards the chest wall and sliding along "
+        "it against the shear of the tissue behind; slide_compression, so along the plates' direction only; "
         "slide_plane, free in its own surface; springs, in its surface against that shear",
     )
     back_layer_mm: float = Field(
@@ -112,6 +112,7 @@ class PlacedBreast:
     Attributes:
         model: elements and material.
         back: condition of its back.
+        back_quads: faces (F, 4) there.
         skin: what its skin adds, and the faces that meet the plates.
         loads: its weight, where it counts.
         stiffening: shear modulus at the compression to come over the initial one.
@@ -119,9 +120,16 @@ class PlacedBreast:
 
     model: HyperelasticModel
     back: BackCondition
+    back_quads: NDArray[np.int64]
     skin: SkinModel
     loads: tuple[Part, ...] = ()
     stiffening: float = 1.0
+
+    @property
+    def contact_quads(self) -> NDArray[np.int64]:
+        """Faces (F, 4) that the plates may press: the skin's and the back's."""
+        # Where the back bends forward, above and below, the tissue behind it lies between the plates too.
+        return np.concatenate([self.skin.contact_quads, self.back_quads])
 
 
 def place_breast(
@@ -155,7 +163,7 @@ def place_breast(
     law = TensionLinear(mechanics.skin_modulus_kpa)
     skin = skin_model(mechanics.skin, model, mesh.skin_quads(), law, mechanics.skin_thickness_mm)
     loads = (_standing_up(model, mechanics.density_kg_m3, angle_deg),) if mechanics.gravity == "standing" else ()
-    return PlacedBreast(model, back, skin, loads, tissue.stiffening)
+    return PlacedBreast(model, back, mesh.back_quads(), skin, loads, tissue.stiffening)
 
 
 def _standing_up(model: HyperelasticModel, density_kg_m3: float, angle_deg: float) -> Gravity:

@@ -8,13 +8,15 @@ from pydantic import Field
 
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.geometry.frames import Points
-from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.alignment import Alignment
 from mammoreg.shape.estimate import estimate_shape
 from stages.closing import resumed
 from stages.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.methods import block_mesh, pose_outline, view_geometry
+
+Nodes = NDArray[np.int64]
+TOUCHING_MM = 1.0
 
 
 class Settings(SettingsModel):
@@ -32,11 +34,12 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Estimate the surface; without an outline it is that of the compression."""
     mesh_file, pose, compress = (inputs.artefact(name) for name in ("mesh", "pose", "compress"))
     mesh = block_mesh(mesh_file)
-    if not pose.has("outline"):
-        return _fields(mesh, compress.array("deformed", "mm"), compress.array("pressure", "kPa"), {"rounds": 0})
     view, lift_mm = view_geometry(pose), float(compress.value("lift_mm"))
-    outline = pose_outline(pose)
     closing, closed = resumed(mesh_file, compress, view.edge_p_mm)
+    nodes = np.union1d(mesh.skin_nodes(), _on_plates(mesh.back_nodes(), closing, closed))
+    if not pose.has("outline"):
+        return _fields(nodes, compress.array("deformed", "mm"), compress.array("pressure", "kPa"), {"rounds": 0})
+    outline = pose_outline(pose)
     facets = skin_facets(mesh.skin_quads(), len(mesh.points), settings.facets)
     floating = replace(view, height_mm=view.height_mm - lift_mm)
     found = estimate_shape(
@@ -52,12 +55,12 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     )
     values = {"rounds": found.rounds, **_misfit("before", found.before), **_misfit("after", found.after)}
     values |= {
-        "contact_drift_mm": _drift(closing, mesh.skin_quads(), closed, found.closed),
+        "contact_drift_mm": _drift(_on_plates(mesh.skin_nodes(), closing, closed), closed, found.closed),
         "penetration_mm": found.closed.penetration_mm,
         "volume_change": found.closed.volume_change,
     }
     lifted = found.closed.deformed + np.array([0.0, 0.0, lift_mm])
-    return _fields(mesh, lifted, found.closed.state.pressure, values | {"min_det_f": found.closed.min_det_f})
+    return _fields(nodes, lifted, found.closed.state.pressure, values | {"min_det_f": found.closed.min_det_f})
 
 
 def _misfit(when: str, state: Alignment) -> dict[str, Value]:
@@ -71,22 +74,24 @@ def _misfit(when: str, state: Alignment) -> dict[str, Value]:
     }
 
 
-def _drift(closing: Closing, skin_quads: NDArray[np.int64], before: Closed, after: Closed) -> float:
-    """Largest motion along the compression of skin nodes that lay on the plates' flat faces, mm."""
-    skin = np.unique(skin_quads)
-    flat = skin if closing.edge is None else skin[before.deformed[skin, 1] < closing.edge - closing.lip]
-    height = before.deformed[flat, 2] - before.height_mm
-    touching = (height < 1.0) | (height > before.gap_mm - 1.0)
-    motion = np.abs(after.deformed[flat, 2] - after.height_mm - height)[touching]
-    return float(motion.max()) if len(motion) else 0.0
+def _on_plates(nodes: Nodes, closing: Closing, closed: Closed) -> Nodes:
+    """Those of `nodes` (B,) that lie on the plates' flat faces."""
+    flat = nodes if closing.edge is None else nodes[closed.deformed[nodes, 1] < closing.edge - closing.lip]
+    height = closed.deformed[flat, 2] - closed.height_mm
+    return np.asarray(flat[(height < TOUCHING_MM) | (height > closed.gap_mm - TOUCHING_MM)])
 
 
-def _fields(mesh: BlockMesh, deformed: Points, pressure: Points, values: dict[str, Value]) -> Fields:
-    skin = mesh.skin_nodes()
+def _drift(nodes: Nodes, before: Closed, after: Closed) -> float:
+    """Largest motion along the compression of nodes (B,) that lay on the plates, mm."""
+    heights = [closed.deformed[nodes, 2] - closed.height_mm for closed in (before, after)]
+    return float(np.abs(heights[1] - heights[0]).max(initial=0.0))
+
+
+def _fields(nodes: Nodes, deformed: Points, pressure: Points, values: dict[str, Value]) -> Fields:
     return Fields(
         arrays={
-            "skin_nodes": Array(skin, "1", "numbers of the skin's mesh nodes"),
-            "surface": Array(deformed[skin], "mm", "estimated places of the skin's nodes, plate frame"),
+            "surface_nodes": Array(nodes, "1", "numbers of the mesh nodes on the skin, and of the back on the plates"),
+            "surface": Array(deformed[nodes], "mm", "estimated places of these nodes, plate frame"),
             "deformed": Array(deformed, "mm", "all mesh nodes as the surface was estimated, plate frame"),
             "pressure": Array(pressure, "kPa", "element pressures there, positive in tension"),
         },
@@ -94,4 +99,4 @@ def _fields(mesh: BlockMesh, deformed: Points, pressure: Points, values: dict[st
     )
 
 
-STAGE = Stage(name="shape", schema=1, inputs=("mesh", "pose", "compress"), settings=Settings, run=run)
+STAGE = Stage(name="shape", schema=2, inputs=("mesh", "pose", "compress"), settings=Settings, run=run)

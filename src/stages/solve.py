@@ -25,7 +25,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     breast = placed_again(inputs.artefact("mesh"), compress)
     solved = solve_prescribed(
         breast.model,
-        shape.array("skin_nodes", "1"),
+        shape.array("surface_nodes", "1"),
         shape.array("surface", "mm") - lift,
         breast.back,
         start=shape.array("deformed", "mm") - lift,
@@ -45,4 +45,4 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     )
 
 
-STAGE = Stage(name="solve", schema=2, inputs=("mesh", "compress", "shape"), settings=Settings, run=run)
+STAGE = Stage(name="solve", schema=3, inputs=("mesh", "compress", "shape"), settings=Settings, run=run)

@@ -44,7 +44,7 @@ def test_surface_reaches_the_outline_between_the_same_plates(inputs, tmp_path, w
 
 def test_surface_is_that_of_the_skin_nodes(inputs, tmp_path):
     got = _shaped(inputs, tmp_path, wider_mm=2.0)
-    skin = got.array("skin_nodes", "1")
+    skin = got.array("surface_nodes", "1")
     np.testing.assert_array_equal(skin, MESH.skin_nodes())
     np.testing.assert_array_equal(got.array("surface", "mm"), got.array("deformed", "mm")[skin])
 

@@ -25,7 +25,7 @@ def _moved(path, shape, motion):
     """The shape's surface moved, and nothing else of it."""
     arrays = {
         name: Array(shape.array(name, units), units, name)
-        for name, units in (("skin_nodes", "1"), ("surface", "mm"), ("deformed", "mm"), ("pressure", "kPa"))
+        for name, units in (("surface_nodes", "1"), ("surface", "mm"), ("deformed", "mm"), ("pressure", "kPa"))
     }
     arrays["surface"] = Array(shape.array("surface", "mm") + motion, "mm", "surface")
     write_artefact(path, header("shape", "R", "CC"), Fields(arrays=arrays))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-BackName = Literal["fixed", "slide_compression", "slide_plane", "springs"]
+BackName = Literal["fixed", "slide_compression", "shear_layer", "slide_plane", "springs"]
 
 NORMAL_STIFFNESS_KPA_PER_MM = 200.0
 """Holds the normal displacement of a sliding back to some hundredths of a millimetre."""
@@ -56,22 +56,24 @@ def back_condition(
     """The back condition of a setting.
 
     Args:
-        name: `fixed`; `slide_compression` (free along the plates' direction only); `slide_plane` (held along each
-            node's own normal, free across it); `springs` (as `slide_plane`, with springs across the normal).
+        name: `fixed`; `slide_compression` (free along the plates' direction only); `shear_layer` (free along the
+            plates' direction and along the chest wall, held across it); `slide_plane` (held along each node's own
+            normal, free across it); `springs` (as `slide_plane`, with springs across the normal).
         points: undeformed nodes (N, 3) of the mesh, plate frame, mm.
         quads: faces (F, 4) of the back.
         tangential_kpa_per_mm: stiffness of `springs` per area.
         pull_mm: displacement (3,) imposed on the back.
-        along_kpa_per_mm: stiffness per area against the sliding of `slide_compression`: the shear of the soft tissue
-            between the model's back and the chest wall.
+        along_kpa_per_mm: stiffness per area against the sliding of `slide_compression` and `shear_layer`: the shear
+            of the soft tissue between the model's back and the chest wall.
     """
     nodes = np.unique(quads)
     if name == "fixed":
         return held_back(nodes, np.array([True, True, True]), pull_mm)
-    if name == "slide_compression":
-        held = held_back(nodes, np.array([True, True, False]), pull_mm)
+    if name in ("slide_compression", "shear_layer"):
+        slides = np.array([name == "shear_layer", False, True])
+        held = held_back(nodes, ~slides, pull_mm)
         area = np.linalg.norm(_node_areas(points, np.asarray(quads, dtype=np.int64))[nodes], axis=1)
-        held.springs[:, 2, 2] = along_kpa_per_mm * area
+        held.springs[:] = along_kpa_per_mm * area[:, None, None] * np.diag(slides)
         return held
     tangential = tangential_kpa_per_mm if name == "springs" else RESIDUAL_STIFFNESS_KPA_PER_MM
     springs = _springs(points, np.asarray(quads, dtype=np.int64), nodes, tangential)
