@@ -88,6 +88,22 @@ def test_back_conditions_hold_what_they_promise(name: BackName) -> None:
         assert np.abs(moved[:, 0]).max() > 1.0
 
 
+def test_shear_layer_lets_the_back_slide_along_the_chest_wall_by_its_softness() -> None:
+    mesh = breast()
+    model = HyperelasticModel(mesh.points, mesh.hexes(), neo_hookean(9.4, 0.495))
+    ways = []
+    for shear in (0.1, 1.0, 1000.0):
+        back = back_condition("shear_layer", mesh.points, mesh.back_quads(), along_kpa_per_mm=shear)
+        deformed = Closing(model, mesh.skin_quads(), back, EDGE, 8.0, 0.3).close(GAP).deformed
+        moved = (deformed - mesh.points)[mesh.back_nodes()]
+        np.testing.assert_allclose(moved[:, 1], 0.0, atol=1e-12)
+        ways.append(np.abs(moved[:, [0, 2]]).max(axis=0))
+    softest, middle, stiffest = ways
+    assert (softest > middle).all()
+    assert (middle > stiffest).all()
+    assert stiffest.max() < 0.05, "a stiff layer is a fixed back"
+
+
 def test_pull_moves_the_back() -> None:
     mesh = breast()
     pulled = closing(mesh, pull=np.array([0.0, -6.0, 0.0])).close(GAP).deformed - mesh.points

@@ -1,0 +1,61 @@
+"""A breast whose back bends forward above, in front of the plates' edge, as real ones do."""
+
+import numpy as np
+import pytest
+
+from mammoreg.geometry import lps_to_breast
+from mammoreg.meshing.block import BlockMesh
+from stages.artefact import Array, Fields, write_artefact
+from tests.stages.pressed_case import EDGE, GAP, run, write_pose, write_start
+from tests.stages.synthetic_case import header
+from tests.unit.block_meshes import half_ellipsoid
+
+FORWARD_MM = 45.0
+
+
+def _bent():
+    """The pressed case's breast, finer, with its upper back drawn forward and the elements along."""
+    upright = half_ellipsoid(8, (60.0, 78.0, 48.0))
+    points = upright.points.copy()
+    above = np.clip(points[:, 2] / points[:, 2].max(), 0.0, None)
+    points[:, 1] -= FORWARD_MM * above**2 * (1.0 + points[:, 1] / 78.0)
+    return BlockMesh(upright.n, points)
+
+
+@pytest.fixture(scope="module")
+def chain(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bent")
+    found = {"calibrate": write_start(folder)["calibrate"], "mesh": folder / "bent.h5"}
+    arrays = {"points": Array(lps_to_breast(_bent().points, "R"), "mm", "nodes")}
+    write_artefact(found["mesh"], header("mesh", "R"), Fields(arrays=arrays, values={"n": _bent().n}))
+    found["pose"] = write_pose(folder / "pose.h5")
+    for stage, of in (("compress", ("calibrate", "mesh", "pose")), ("shape", ("mesh", "pose", "compress"))):
+        found[stage] = run(stage, folder / stage, {name: getattr(found[name], "path", found[name]) for name in of})
+    found["solve"] = run(
+        "solve", folder / "solve", {n: getattr(found[n], "path", found[n]) for n in ("mesh", "compress", "shape")}
+    )
+    return found
+
+
+def _inside_the_plates(artefact, height_mm):
+    """Depth (B,) of back nodes in the plates, mm, those in front of the plates' lips."""
+    back = artefact.array("deformed", "mm")[_bent().back_nodes()]
+    height = back[back[:, 1] < EDGE - 8.0, 2] - height_mm
+    assert len(height) > 4, "the back must lie between the plates for this test to say anything"
+    return np.maximum(-height, height - GAP)
+
+
+def test_back_between_the_plates_stays_out_of_them(chain):
+    height_mm = chain["compress"].value("height_mm")
+    for stage in ("compress", "shape", "solve"):
+        assert chain[stage].ok, chain[stage].message
+        assert _inside_the_plates(chain[stage], height_mm).max() < 1.5
+
+
+def test_surface_holds_the_back_that_the_plates_press(chain):
+    nodes = chain["shape"].array("surface_nodes", "1")
+    skin, back = _bent().skin_nodes(), _bent().back_nodes()
+    assert np.isin(skin, nodes).all()
+    pressed = np.setdiff1d(nodes, skin)
+    assert len(pressed) > 0
+    assert np.isin(pressed, back).all()
