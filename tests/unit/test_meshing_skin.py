@@ -56,3 +56,18 @@ def test_a_common_edge_has_the_same_corners_on_both_faces() -> None:
     rim = 4 * mesh.n
     edges = (4 * faces + rim) // 2
     assert len(places) == nodes + edges + faces
+
+
+@pytest.mark.parametrize("k", [1, 3])
+def test_rim_is_where_the_skin_meets_the_back(k: int) -> None:
+    mesh = half_ellipsoid(4)
+    facets = skin_facets(mesh.skin_quads(), len(mesh.points), k)
+    on_back = np.isclose(facets.positions(mesh.points)[:, 1], mesh.points[mesh.back_nodes(), 1].max())
+    np.testing.assert_array_equal(facets.rim, on_back)
+    assert facets.rim.any()
+
+
+def test_closed_surface_has_no_rim() -> None:
+    mesh = half_ellipsoid(3)
+    faces = np.concatenate([mesh.skin_quads(), mesh.back_quads()])
+    assert not skin_facets(faces, len(mesh.points), 2).rim.any()

@@ -25,7 +25,8 @@ def ellipsoid() -> tuple[np.ndarray, SkinFacets]:
     shell = cube[np.abs(cube).max(axis=1) > 0.999]
     shell /= np.linalg.norm(shell, axis=1, keepdims=True)
     quads = ConvexHull(shell).simplices[:, [0, 1, 2, 2]].astype(np.intp)
-    return shell * [60.0, 80.0, 50.0], SkinFacets(sparse.csr_array(sparse.eye_array(len(shell))), quads)
+    closed = np.zeros(len(shell), dtype=bool)
+    return shell * [60.0, 80.0, 50.0], SkinFacets(sparse.csr_array(sparse.eye_array(len(shell))), quads, closed)
 
 
 def pressed(points: np.ndarray, view: ViewGeometry) -> Compressed:

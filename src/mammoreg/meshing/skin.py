@@ -16,10 +16,12 @@ class SkinFacets:
     Attributes:
         interpolation: (M, N) matrix from mesh nodes to facet corners.
         quads: facets (Q, 4) by corner numbers, oriented as the faces.
+        rim: which corners (M,) lie on the surface's open edge, where the skin goes on beyond the mesh.
     """
 
     interpolation: sparse.csr_array
     quads: NDArray[np.intp]
+    rim: NDArray[np.bool_]
 
     def positions(self, nodes: Points) -> Points:
         """Facet corners (M, 3) of mesh nodes (N, 3)."""
@@ -41,4 +43,13 @@ def skin_facets(faces: NDArray[np.integer], node_count: int, k: int) -> SkinFace
     corner = np.arange(per_face).reshape(k + 1, k + 1)
     cell = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
     quads = (cell[None] + per_face * np.arange(len(faces))[:, None, None]).reshape(-1, 4)
-    return SkinFacets(matrix, quads.astype(np.intp))
+    sides = np.stack([s == 0.0, r == 1.0, s == 1.0, r == 0.0])
+    rim = (_open_edges(faces) @ sides).ravel()
+    return SkinFacets(matrix, quads.astype(np.intp), rim)
+
+
+def _open_edges(faces: NDArray[np.integer]) -> NDArray[np.bool_]:
+    """Which edges (F, 4) of quadrilaterals, the first from corner 0 to 1, belong to no other."""
+    pairs = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    _, inverse, count = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
+    return np.asarray(count[inverse.ravel()] == 1).reshape(faces.shape)

@@ -35,11 +35,21 @@ class Alignment:
     rms_mm: float
 
 
-def measure(points: Points, quads: NDArray[np.intp], view: ViewGeometry, outline: RadialOutline) -> Alignment:
-    """Compare a surface (N, 3) of the plate frame with quads (Q, 4) to an outline, without moving it."""
+def measure(
+    points: Points,
+    quads: NDArray[np.intp],
+    view: ViewGeometry,
+    outline: RadialOutline,
+    rim: NDArray[np.bool_] | None = None,
+) -> Alignment:
+    """Compare a surface (N, 3) of the plate frame with quads (Q, 4) to an outline, without moving it.
+
+    Where the silhouette runs along the surface's `rim` (N,) the model ends and skin does not: nothing is compared.
+    """
     model = outline.of_model(detector_mm(points, view), quads)
     gap = outline.normal_gap(model) / view.middle_magnification
-    weight = np.where(np.isfinite(gap), outline.weight, 0.0)
+    seen = np.isfinite(gap) if rim is None else np.isfinite(gap) & ~rim[model.edge_nodes].all(axis=1)
+    weight = np.where(seen, outline.weight, 0.0)
     total = float(weight.sum())
     squares = float(np.sum(weight * np.nan_to_num(gap) ** 2))
     return Alignment(view, model, gap, weight, float(np.sqrt(squares / total)) if total > 0 else float("nan"))

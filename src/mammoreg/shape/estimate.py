@@ -64,14 +64,14 @@ def estimate_shape(
     Raises:
         NotConvergedError: with the reason.
     """
-    before = after = measure(facets.positions(closed.deformed), facets.quads, view, outline)
+    before = after = measure(facets.positions(closed.deformed), facets.quads, view, outline, facets.rim)
     mu_kpa = float(np.average(closing.model.material.mu_kpa, weights=closing.model.volume))
     memory, held, done = np.zeros(len(outline.theta)), None, 0
     best = (before, closed)
     while done < rounds and _mean_misfit(after) > settled_mm:
         ties, rays = outline_ties(closed.deformed, faces, facets, view, outline, stiffness * mu_kpa, memory)
         closed = closing.rest(closed, ties if held is None else ties.joined(held), REST_DAMPING)
-        after = measure(facets.positions(closed.deformed), facets.quads, view, outline)
+        after = measure(facets.positions(closed.deformed), facets.quads, view, outline, facets.rim)
         hidden = _hidden(ties, rays, closed.deformed, view, outline, after)
         inwards = ties.kept(hidden & (ties.distance(closed.deformed) > 0.0))
         held = inwards if held is None else held.joined(inwards)

@@ -41,7 +41,7 @@ def outline_ties(
     Returns:
         The ties, and the rays (T,) on which they are.
     """
-    state = measure(facets.positions(nodes), facets.quads, view, outline)
+    state = measure(facets.positions(nodes), facets.quads, view, outline, facets.rim)
     used = np.flatnonzero((state.weight > 0) & (state.model.edge_nodes[:, 0] >= 0))
     edge, share = state.model.edge_nodes[used], state.model.edge_weight[used]
     rows = facets.interpolation[edge[:, 0]].multiply((1.0 - share)[:, None]).tocsr()
