@@ -6,8 +6,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from stages.errors import FaultsError, UserError
-from stages.threads import compute_with_one_thread
+from stages.engine.errors import FaultsError, UserError
+from stages.engine.threads import compute_with_one_thread
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -22,8 +22,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(given: argparse.Namespace) -> int:
-    from stages.contract import Subject
-    from stages.run import run_stage
+    from stages.engine.contract import Subject
+    from stages.engine.run import run_stage
 
     inputs: dict[str, Path | list[Path]] = {}
     for name, path in map(_pair, given.inputs):
@@ -38,8 +38,8 @@ def _run(given: argparse.Namespace) -> int:
 
 
 def _check(given: argparse.Namespace) -> int:
-    from stages.cases import read_cohort
-    from stages.preflight import check_cohort
+    from stages.cohort.cases import read_cohort
+    from stages.cohort.preflight import check_cohort
 
     cohort = read_cohort(given.cases, given.views)
     if faults := check_cohort(cohort):
@@ -49,7 +49,7 @@ def _check(given: argparse.Namespace) -> int:
 
 
 def _show(given: argparse.Namespace) -> int:
-    from stages.artefact import Artefact
+    from stages.engine.artefact import Artefact
     from stages.showing import describe
 
     print("\n\n".join(describe(Artefact(path)) for path in given.artefacts))
@@ -57,8 +57,8 @@ def _show(given: argparse.Namespace) -> int:
 
 
 def _export(given: argparse.Namespace) -> int:
-    from stages.artefact import Artefact
-    from stages.exporting import export_artefact
+    from stages.engine.artefact import Artefact
+    from stages.formats.exporting import export_artefact
 
     for path in export_artefact(Artefact(given.artefact), given.to):
         print(path)

@@ -19,10 +19,10 @@ from mammoreg.localization.lesions import (
     area_from_mask,
 )
 from mammoreg.metrics.distances import breast_scale_mm
-from stages.artefact import Array, Artefact
-from stages.contract import Inputs
+from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
+from stages.engine.artefact import Array, Artefact
+from stages.engine.contract import Inputs
 from stages.methods import view_geometry
-from stages.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
 
 MASK_NAME = "lesion"
 

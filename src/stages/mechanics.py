@@ -16,9 +16,9 @@ from mammoreg.fem.skin.law import SKIN_MODULUS_KPA, TensionLinear
 from mammoreg.fem.skin.membrane import SKIN_THICKNESS_MM
 from mammoreg.fem.skin.models import SkinModel, SkinName, skin_model
 from mammoreg.geometry import breast_to_plate
+from mammoreg.materials.tissue import MaterialName, Tissue, catalogue_tissue, neo_hookean_tissue
 from mammoreg.meshing.block import BlockMesh
-from stages.contract import SettingsModel
-from stages.tissue import MaterialName, Tissue, catalogue_tissue, neo_hookean_tissue
+from stages.engine.contract import SettingsModel
 
 Floats = NDArray[np.float64]
 _INFERIOR, _ANTERIOR = np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0])

@@ -9,7 +9,7 @@ from mammoreg.localization.deformation import AffineDeformation, MeshDeformation
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.outline import RadialOutline, radial_outline
 from mammoreg.pose.silhouette import pixels_at_detector, ray_angles
-from stages.artefact import Artefact
+from stages.engine.artefact import Artefact
 
 AFFINE_METHODS = ("rigid", "scaling")
 MESH_METHODS = {"plate": "compress", "updated": "solve"}

@@ -15,8 +15,8 @@ import yaml
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from stages.cases import CaseRow, ViewRow
-from stages.config import config_model
+from stages.cohort.cases import CaseRow, ViewRow
+from stages.engine.config import config_model
 
 WIDTH = 116
 LONGEST = 60

@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterator
 
-from stages.artefact import Artefact
+from stages.engine.artefact import Artefact
 
 LONGEST = 100
 

@@ -10,9 +10,9 @@ from PIL import Image
 
 from mammoreg.geometry import lps_to_breast
 from mammoreg.geometry.frames import Laterality
-from stages.artefact import Array, Artefact, Fields, VolumeField, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from tests.stages import synthetic_case as synthetic
 
 LESION = np.array([8.0, -45.0, 6.0])
@@ -44,7 +44,7 @@ def run_figures(folder: Path, inputs: dict[str, Any], laterality: Laterality = "
 
 
 def _run(stage: str, folder: Path, inputs: dict[str, Any], laterality: Laterality, view: str | None) -> Path:
-    from stages.registry import load_stage
+    from stages.engine.registry import load_stage
 
     record = load_stage(stage)
     given = {name: inputs[name] for name in (*record.inputs, *record.optional) if name in inputs}

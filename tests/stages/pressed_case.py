@@ -16,11 +16,11 @@ from mammoreg.meshing.locate import Locator
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.silhouette import detector_mm, quad_edges, ray_angles, silhouette
 from mammoreg.projection.cone_beam import project_volume
-from stages.artefact import Array, Artefact, Fields, VolumeField, write_artefact
-from stages.closing import closing_plates
-from stages.contract import Subject
+from stages.compress.record import closing_plates
+from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from stages.mechanics import Mechanics, place_breast
-from stages.run import run_stage
 from tests.stages.synthetic_case import header
 from tests.unit.block_meshes import half_ellipsoid
 

@@ -10,7 +10,7 @@ from mammoreg.geometry import ViewGeometry, Volume, lps_to_breast
 from mammoreg.geometry.frames import Laterality, plate_rotation
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.meshing.block import BlockMesh
-from stages.artefact import Array, Fields, VolumeField, write_artefact
+from stages.engine.artefact import Array, Fields, VolumeField, write_artefact
 
 SHRINK = 0.7
 ROWS, COLUMNS, PIXEL_MM = 700, 400, 0.25

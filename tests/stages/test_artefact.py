@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mammoreg.geometry import Volume
-from stages.artefact import Array, Artefact, Fields, VolumeField, write_artefact, write_bytes
-from stages.errors import ArtefactError
+from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact, write_bytes
+from stages.engine.errors import ArtefactError
 
 ATTRS = {"stage": "segment", "case": "c", "view": "", "laterality": "L", "artefact_id": "x"}
 
@@ -171,7 +171,7 @@ def test_disk_full_leaves_the_old_file_and_nothing_else(tmp_path):
     write_bytes(tmp_path / "x.h5", b"old")
     script = (
         "import resource, sys, pathlib, numpy as np\n"
-        "from stages.artefact import *\n"
+        "from stages.engine.artefact import *\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))\n"
         f"attrs = {ATTRS!r}\n"
         "fields = Fields(arrays={'big': Array(np.ones(10000), 'mm', 'big')})\n"

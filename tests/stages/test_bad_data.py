@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stages.artefact import Artefact, Fields, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact, Fields, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from tests.stages.cohort_files import write_dicom, write_volume
 from tests.stages.synthetic_case import header, write_mesh, write_segment
 from tests.unit.mammogram_images import PIXEL_MM, breast_image

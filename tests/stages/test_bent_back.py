@@ -5,7 +5,7 @@ import pytest
 
 from mammoreg.geometry import lps_to_breast
 from mammoreg.meshing.block import BlockMesh
-from stages.artefact import Array, Fields, write_artefact
+from stages.engine.artefact import Array, Fields, write_artefact
 from tests.stages.pressed_case import EDGE, GAP, run, write_pose, write_start
 from tests.stages.synthetic_case import header
 from tests.unit.block_meshes import half_ellipsoid

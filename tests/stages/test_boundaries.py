@@ -15,7 +15,7 @@ def test_import_contracts_hold():
 
 def test_a_stage_without_finite_elements_does_not_load_them():
     code = (
-        "import sys; from stages.registry import load_stage; load_stage('segment'); "
+        "import sys; from stages.engine.registry import load_stage; load_stage('segment'); "
         "print([m for m in ('skfem', 'matplotlib', 'snakemake', 'pandas') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=PROJECT / "src", capture_output=True, text=True, check=True)

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from stages.cases import read_cohort
-from stages.errors import FaultsError
+from stages.cohort.cases import read_cohort
+from stages.engine.errors import FaultsError
 from tests.shared_data import DATA, requires_shared
 from tests.stages.cohort_files import write_tsv
 

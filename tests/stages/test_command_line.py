@@ -7,7 +7,7 @@ import pytest
 from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
 from stages.__main__ import main
-from stages.artefact import Array, Fields, VolumeField, write_artefact
+from stages.engine.artefact import Array, Fields, VolumeField, write_artefact
 from tests.stages.cohort_files import write_cohort
 
 ATTRS = {

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 import yaml
 
-from stages.config import config_model, read_config, stage_settings
-from stages.errors import FaultsError
+from stages.engine.config import config_model, read_config, stage_settings
+from stages.engine.errors import FaultsError
+from stages.engine.registry import STAGE_MODULES, load_stage
 from stages.reference import reference_files
-from stages.registry import STAGE_MODULES, load_stage
 
 PROJECT = Path(__file__).resolve().parents[2]
 

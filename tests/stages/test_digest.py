@@ -2,8 +2,8 @@
 
 import pytest
 
-from stages.digest import SOURCE, module_digest
-from stages.registry import STAGE_MODULES
+from stages.engine.digest import SOURCE, module_digest
+from stages.engine.registry import STAGE_MODULES
 
 
 @pytest.fixture
@@ -20,7 +20,7 @@ def source(tmp_path):
 
 
 def _after(source, name, old, new):
-    from stages import digest
+    from stages.engine import digest
 
     before = module_digest("stages.a", source)
     path = source / "stages" / name

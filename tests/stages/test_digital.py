@@ -18,11 +18,11 @@ from mammoreg.phantom import anatomy, mammogram, warp
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.patient import ROLL_DEG, Patient
 from mammoreg.phantom.warp import Deformed
-from stages import digital
-from stages.contract import Inputs, Subject
-from stages.digital import Settings
-from stages.digital_files import mammogram_dicom, mask_png, nifti, points_tsv
-from stages.readers.mr import read_mr
+from stages.cohort.readers.mr import read_mr
+from stages.digital import stage as digital
+from stages.digital.dicom import mammogram_dicom, mask_png, nifti, points_tsv
+from stages.digital.stage import Settings
+from stages.engine.contract import Inputs, Subject
 
 TABLES = Path(__file__).resolve().parents[2] / "config" / "digital"
 VIEW = ViewGeometry(6.0, 0.0, 5.0, -30.0, 60.0, 650.0, 15.0, 0.2, 8, 6)

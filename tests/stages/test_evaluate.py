@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mammoreg.geometry import lps_to_breast, plate_to_breast
-from stages.artefact import Artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from tests.stages import synthetic_case as synthetic
 from tests.stages.test_localize import LESION, POINTS, localized, mr_marks, view_marks, write_tsv
 

@@ -12,9 +12,9 @@ from PIL import Image
 
 from mammoreg.geometry import lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
-from stages.artefact import Artefact
+from stages.engine.artefact import Artefact
+from stages.figures.exports import stored_image
 from stages.marks import canonical_image
-from stages.picturing.exports import stored_image
 from tests.stages import synthetic_case as synthetic
 from tests.stages.pictured_case import (
     LESION,

@@ -9,9 +9,9 @@ from PIL import Image
 
 from mammoreg.geometry import lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
-from stages.artefact import Artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from tests.stages import synthetic_case as synthetic
 
 LESION = np.array([12.0, -40.0, 9.0])

@@ -8,10 +8,10 @@ import pytest
 from mammoreg.geometry import lps_to_breast
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import volumes
-from stages.artefact import Array, Artefact, Fields, VolumeField, write_artefact
-from stages.contract import Inputs, Subject
-from stages.run import run_stage
-from stages.tissue_map import gland_share
+from stages.compress.gland_map import gland_share
+from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.contract import Inputs, Subject
+from stages.engine.run import run_stage
 from tests.shared_data import DATA, requires_shared
 from tests.unit.breast_bodies import half_ellipsoid
 

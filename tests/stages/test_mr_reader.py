@@ -13,7 +13,7 @@ from pydicom.uid import ExplicitVRLittleEndian, MRImageStorage, generate_uid
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from stages.readers.mr import lps_volume, read_mr, read_nifti
+from stages.cohort.readers.mr import lps_volume, read_mr, read_nifti
 from tests.shared_data import DATA, requires_shared
 
 TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])

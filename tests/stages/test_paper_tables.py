@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from mammoreg.metrics.summary import Summary
-from stages.artefact import Artefact, Fields, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
-from stages.studies.paper_sentences import CLAIMS, PAPER, numbers_of, sentences
-from stages.studies.volunteer import TABLES
+from stages.engine.artefact import Artefact, Fields, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
+from stages.studies.volunteer.paper_sentences import CLAIMS, PAPER, numbers_of, sentences
+from stages.studies.volunteer.stage import TABLES
 from tests.stages import synthetic_case as synthetic
 
 COLUMNS = {

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from mammoreg.errors import DataError
-from stages.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
+from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
 
 
 def picture(path: Path, pixels: np.ndarray) -> Path:

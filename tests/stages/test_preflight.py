@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from stages.cases import read_cohort
-from stages.preflight import check_cohort
+from stages.cohort.cases import read_cohort
+from stages.cohort.preflight import check_cohort
 from tests.shared_data import DATA, requires_shared
 from tests.stages.cohort_files import (
     AFFINE,

@@ -9,9 +9,9 @@ import pytest
 from mammoreg.geometry import Volume
 from mammoreg.materials.attenuation import ATTENUATION_20KEV_PER_MM
 from mammoreg.projection.cone_beam import project_volume
-from stages.artefact import Array, Artefact, Fields, VolumeField, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from tests.stages.synthetic_case import (
     COLUMNS,
     DEPTH,

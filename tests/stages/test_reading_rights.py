@@ -2,11 +2,11 @@
 
 import pytest
 
-from stages.cases import CaseRow, ViewRow
-from stages.contract import Subject
-from stages.errors import UserError
-from stages.registry import CASE_STAGES, VIEW_STAGES, load_stage
-from stages.run import run_stage
+from stages.cohort.cases import CaseRow, ViewRow
+from stages.engine.contract import Subject
+from stages.engine.errors import UserError
+from stages.engine.registry import CASE_STAGES, VIEW_STAGES, load_stage
+from stages.engine.run import run_stage
 from tests.stages.synthetic_case import write_case
 
 MARKS = {"mr_lesion", "mr_landmarks", "mr_compressed_landmarks", "mr_surface_points", "mr_compressed_surface_points"}

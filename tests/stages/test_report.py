@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from stages.artefact import Artefact, Fields, write_artefact
-from stages.contract import Subject
-from stages.reporting.case import mean_text
-from stages.reporting.cohort import statistics_sections
-from stages.run import run_stage
+from stages.engine.artefact import Artefact, Fields, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
+from stages.report.case import mean_text
+from stages.report.cohort import statistics_sections
 from tests.stages.pictured_case import run_figures, write_pictured_case
 
 SECRET = "Jane <script>"

@@ -8,10 +8,10 @@ import pytest
 from pydantic import Field
 
 from mammoreg.errors import DataError, NotConvergedError
-from stages.artefact import Array, Artefact, Fields
-from stages.contract import SettingsModel, Stage, Subject
-from stages.errors import UserError
-from stages.run import command_line, content_id, execute
+from stages.engine.artefact import Array, Artefact, Fields
+from stages.engine.contract import SettingsModel, Stage, Subject
+from stages.engine.errors import UserError
+from stages.engine.run import command_line, content_id, execute
 
 
 class Settings(SettingsModel):

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from mammoreg.metrics.distances import breast_scale_mm
-from stages.artefact import Artefact, Fields, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
-from stages.studies import chain, runtime
-from stages.studies.comparison import view_results
+from stages.engine.artefact import Artefact, Fields, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
+from stages.studies import chain
+from stages.studies.runtime import stage as runtime
+from stages.studies.runtime.comparison import view_results
 from tests.stages import synthetic_case as synthetic
 from tests.stages.pictured_case import write_pictured_case
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from stages.contract import Fields, Inputs, Subject
-from stages.readers.mr import read_nifti
-from stages.segment import Settings, run
+from stages.cohort.readers.mr import read_nifti
+from stages.engine.contract import Fields, Inputs, Subject
+from stages.segment.stage import Settings, run
 from tests.shared_data import DATA, requires_shared
 from tests.unit.torso_phantom import RIGHT, torso
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stages.artefact import Array, Artefact, Fields, write_artefact
+from stages.engine.artefact import Array, Artefact, Fields, write_artefact
 from tests.stages.pressed_case import MESH, run, write_pose, write_start
 from tests.stages.synthetic_case import header
 

@@ -11,14 +11,14 @@ import pytest
 from mammoreg.errors import NotConvergedError
 from mammoreg.scenes.design import stability_design
 from mammoreg.scenes.scenario import SCAN
-from stages.artefact import Artefact, Fields, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
-from stages.studies import stability_scan_mesh
-from stages.studies.isolated import in_own_process
-from stages.studies.stability import COLUMNS
-from stages.studies.stability_batch import NO_SCAN, NOT_CHOSEN, batch_of
-from stages.studies.stability_summary import summary, with_mesh_trend
+from stages.engine.artefact import Artefact, Fields, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
+from stages.studies.stability import scan_mesh as stability_scan_mesh
+from stages.studies.stability.batch import NO_SCAN, NOT_CHOSEN, batch_of
+from stages.studies.stability.isolated import in_own_process
+from stages.studies.stability.stage import COLUMNS
+from stages.studies.stability.summary import summary, with_mesh_trend
 from tests.shared_data import DATA, requires_shared
 from tests.stages import synthetic_case as synthetic
 

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from mammoreg.errors import NotConvergedError
-from stages.contract import Fields, Inputs, Subject
-from stages.studies import table_1
+from stages.engine.contract import Fields, Inputs, Subject
+from stages.studies.table_1 import stage as table_1
 
 PRINTED = {"wellman", "azar", "samani", "krouskop", "bakic", "lorenzen"}
 

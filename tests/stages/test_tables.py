@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from stages.artefact import Artefact, Fields, write_artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact, Fields, write_artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 
 FORMS = ("csv", "md", "html")
 NAMES = (

@@ -5,8 +5,8 @@ import pytest
 
 from mammoreg.materials.catalogue import CATALOGUE
 from mammoreg.materials.elastic import bulk_ratio
+from mammoreg.materials.tissue import MATERIALS, catalogue_tissue, neo_hookean_tissue
 from stages.mechanics import Mechanics
-from stages.tissue import MATERIALS, catalogue_tissue, neo_hookean_tissue
 
 GLAND = np.array([0.0, 0.25, 1.0])
 

@@ -8,13 +8,13 @@ import pytest
 
 from mammoreg.geometry import plate_to_breast
 from mammoreg.localization.deformation import MeshDeformation, ReferenceMesh
+from mammoreg.materials.tissue import MATERIALS
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.shape.surface_points import nearest_on_skin
-from stages.artefact import Artefact, Fields
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact, Fields
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from stages.studies import chain
-from stages.tissue import MATERIALS
 from tests.stages.pressed_case import ANGLE, MESH, pressed, run, write_pose, write_start
 from tests.stages.synthetic_case import write_failed
 

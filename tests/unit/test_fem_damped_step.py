@@ -7,8 +7,8 @@ from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.parts.back import back_condition
 from mammoreg.fem.parts.gravity import gravity
 from mammoreg.fem.plates.closing import Closing, ClosingOptions
+from mammoreg.fem.plates.newton import DampedStep
 from mammoreg.fem.plates.state import DampedState, Load
-from mammoreg.fem.plates.step import DampedStep
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block
 

@@ -6,7 +6,7 @@ import pytest
 from mammoreg.fem.plates import nested as fem_nested
 from mammoreg.fem.plates.closing import ClosingOptions
 from mammoreg.fem.plates.nested import close_nested, coarsened, nested_sizes
-from mammoreg.fem.plates.unfold import unfolded
+from mammoreg.fem.plates.untangle import unfolded
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.breast_block import HEIGHT_MM, UNDAMPED, breast_block, breast_closing
 

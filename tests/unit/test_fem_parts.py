@@ -14,7 +14,7 @@ from mammoreg.fem.parts.part import BackSprings, Part, all_nodes, back_springs, 
 from mammoreg.fem.parts.plane_ties import PlaneTies
 from mammoreg.fem.parts.point_ties import point_ties
 from mammoreg.fem.plates.closing import Closing
-from mammoreg.fem.plates.damped import DampedEquilibrium
+from mammoreg.fem.plates.equilibrium import DampedEquilibrium
 from mammoreg.fem.prescribed.solve import solve_prescribed
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.fe_bodies import block

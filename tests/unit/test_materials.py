@@ -11,8 +11,8 @@ from mammoreg.materials.catalogue import CATALOGUE, SKIN, Tissue
 from mammoreg.materials.cube import SULLIVAN, cube_force_n, mu_for_force_kpa
 from mammoreg.materials.elastic import bulk_ratio, neo_hookean
 from mammoreg.materials.laws import Exponential, HardenedFat, Linear, NeoHookean
-from stages import calibrate
-from stages.contract import Inputs, Subject
+from stages.calibrate import stage as calibrate
+from stages.engine.contract import Inputs, Subject
 from tests.shared_data import DATA, requires_shared
 
 REFERENCE = DATA / "reference/materials.json"

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from stages.artefact import Artefact
-from stages.contract import Laterality, Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact
+from stages.engine.contract import Laterality, Subject
+from stages.engine.run import run_stage
 
 Settings = Mapping[str, Mapping[str, Any]]
 

@@ -15,7 +15,7 @@ from mammoreg.localization.lesions import LesionArea, MaskLesion, area_from_mask
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
 from mammoreg.localization.to_mr import MrPrediction, locate_in_breast
 from mammoreg.metrics.distances import detector_distance_mm
-from stages.readers.points import read_image_mask, read_mask
+from stages.cohort.readers.points import read_image_mask, read_mask
 from tests.shared_data import DATA, requires_shared
 
 TWINS = DATA / "twins"

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from pydicom import dcmread
 
-from stages.artefact import Artefact
+from stages.engine.artefact import Artefact
 from tests.shared_data import DATA, requires_shared
 from tests.verification.case_run import Given, run_case
 

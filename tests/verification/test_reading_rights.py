@@ -8,9 +8,9 @@ import pytest
 from scipy import ndimage
 
 from mammoreg.geometry import Volume
-from stages.artefact import Artefact
-from stages.contract import Subject
-from stages.run import run_stage
+from stages.engine.artefact import Artefact
+from stages.engine.contract import Subject
+from stages.engine.run import run_stage
 from tests.stages.pressed_case import second_mask
 from tests.stages.synthetic_case import write_case
 from tests.stages.test_localize import localized, mr_marks, view_marks, write_tsv

@@ -80,7 +80,7 @@ def test_second_run_has_nothing_to_do_even_after_touching_and_copying(finished):
 
 def test_comment_in_the_code_reruns_nothing_and_code_reruns_what_follows(finished):
     project, cohort, _ = finished
-    module = project / "src/stages/shape.py"
+    module = project / "src/stages/shape/stage.py"
     text = module.read_text()
     module.write_text("# a comment\n" + text)
     assert NOTHING in snakemake(project, *_keys(cohort), "-n").stdout

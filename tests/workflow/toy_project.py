@@ -10,7 +10,7 @@ import nibabel
 import numpy as np
 from PIL import Image
 
-from stages.registry import STUDIES
+from stages.engine.registry import STAGE_MODULES
 
 PROJECT = Path(__file__).resolve().parents[2]
 INPUTS = {
@@ -42,7 +42,7 @@ TOY_STAGE = '''
 import numpy as np
 from pydantic import Field
 from mammoreg.errors import DataError
-from stages.contract import Array, Fields, SettingsModel, Stage
+from stages.engine.contract import Array, Fields, SettingsModel, Stage
 
 class Settings(SettingsModel):
     """Settings of a stage that computes next to nothing."""
@@ -56,7 +56,7 @@ def run(inputs, settings, subject):
             raise DataError(f"{{mr}}: holds NaN; export the volume again")
     failed = [a for found in inputs.stages.values() for a in found if not a.ok]
     status = {{"status": failed[0].status, "message": failed[0].message}} if failed and {name!r} == "evaluate" else {{}}
-    from stages.tabulating.layout import TABLES
+    from stages.tables.layout import TABLES
     files = {{
         "report": {{"report.html": b"report"}},
         "tables": {{name: b"table" for name in ("cohort.nc", *(f"{{t.name}}.csv" for t in TABLES))}},
@@ -77,11 +77,8 @@ def make_project(folder: Path) -> Path:
         (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(PROJECT / "src", folder / "src", ignore=ignored)
-    (folder / "src/stages/studies").mkdir(exist_ok=True)
-    (folder / "src/stages/studies/__init__.py").write_text('"""Studies."""\n')
     for name, (required, optional) in INPUTS.items():
-        module = folder / "src/stages" / ("studies" if name in STUDIES else "") / f"{name}.py"
-        shutil.rmtree(module.with_suffix(""), ignore_errors=True)
+        module = folder.joinpath("src", *STAGE_MODULES[name].split(".")).with_suffix(".py")
         module.write_text(
             TOY_STAGE.format(
                 name=name,

@@ -4,11 +4,11 @@ from pathlib import Path
 from snakemake.exceptions import WorkflowError
 from snakemake.settings.types import ExecMode
 
-from stages.cases import read_cohort
-from stages.config import read_config, stage_settings
-from stages.errors import FaultsError, UserError
-from stages.preflight import check_cohort
-from stages.registry import (
+from stages.cohort.cases import read_cohort
+from stages.engine.config import read_config, stage_settings
+from stages.engine.errors import FaultsError, UserError
+from stages.cohort.preflight import check_cohort
+from stages.engine.registry import (
     CASE_STAGES,
     COHORT_STAGES,
     STAGE_MODULES,
@@ -17,7 +17,7 @@ from stages.registry import (
     load_stage,
     stage_digest,
 )
-from stages.tabulating.layout import TABLES as TABLES_WRITTEN
+from stages.tables.layout import TABLES as TABLES_WRITTEN
 
 PROJECT = Path(workflow.basedir)
 

@@ -1,5 +1,5 @@
 """Bridge from rule `complete` to the check that no case failed."""
 
-from stages.bridge import run_complete
+from stages.engine.bridge import run_complete
 
 run_complete(snakemake)  # noqa: F821

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from stages.contract import Inputs, Subject
-from stages.registry import STAGE_MODULES, VIEW_STAGES, load_stage
-from stages.run import run_stage
+from stages.engine.contract import Inputs, Subject
+from stages.engine.registry import STAGE_MODULES, VIEW_STAGES, load_stage
+from stages.engine.run import run_stage
 
 _VIEW_FILES = ("image", "lesion", "landmarks")
 

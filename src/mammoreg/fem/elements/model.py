@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.fem.elements.batches import ElementRun, determinants, element_runs
 from mammoreg.fem.elements.hexahedra import Array, Integers, hexahedra
-from mammoreg.fem.elements.runs import ElementRun, determinants, element_runs
 from mammoreg.fem.elements.state import RunState, run_energy, run_forces, run_state
 from mammoreg.fem.elements.tangent import TangentWork, run_tangent
 from mammoreg.materials.elastic import ElasticMaterial

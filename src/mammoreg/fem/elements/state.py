@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mammoreg.fem.elements.batches import ElementRun, by_point, cofactors, determinants
 from mammoreg.fem.elements.hexahedra import Array
-from mammoreg.fem.elements.runs import ElementRun, by_point, cofactors, determinants
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ matrices over all quadrature points and its transpose; g_aj g_bi is another one,
 
 import numpy as np
 
+from mammoreg.fem.elements.batches import RUN, ElementRun
 from mammoreg.fem.elements.hexahedra import Array
-from mammoreg.fem.elements.runs import RUN, ElementRun
 from mammoreg.fem.elements.state import RunState
 
 

@@ -15,11 +15,11 @@ from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.parts.part import Part, all_nodes
-from mammoreg.fem.plates.closed import Closed
-from mammoreg.fem.plates.damped import DampedEquilibrium
+from mammoreg.fem.plates.equilibrium import DampedEquilibrium
 from mammoreg.fem.plates.options import COARSE, ClosingOptions
 from mammoreg.fem.plates.predictor import affine_predictor
-from mammoreg.fem.plates.resting import STIFF_DAMPING, Resting
+from mammoreg.fem.plates.relaxation import STIFF_DAMPING, Resting
+from mammoreg.fem.plates.result import Closed
 from mammoreg.fem.plates.state import DampedState, Load
 
 __all__ = ["COARSE", "Closed", "Closing", "ClosingOptions", "Moving"]

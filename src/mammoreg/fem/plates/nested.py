@@ -13,7 +13,7 @@ from mammoreg.fem.linear.hierarchy import Array, Hierarchy, Integers, block_size
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.fem.plates.state import DampedState
-from mammoreg.fem.plates.unfold import unfolded
+from mammoreg.fem.plates.untangle import unfolded
 from mammoreg.materials.elastic import ElasticMaterial
 from mammoreg.meshing.block import BlockMesh
 

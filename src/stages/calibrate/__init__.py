@@ -1,0 +1,1 @@
+"""Stage `calibrate`: tissue stiffness against the measured range of plate forces."""

@@ -1,0 +1,265 @@
+"""The two tables that a user hands in: their models, and the cohort that they describe (contract, inputs)."""
+
+import csv
+import difflib
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from stages.engine.errors import Fault, FaultsError
+
+RESERVED = ("tables", "figures", "benchmarks", "logs", "digital")
+PICTURES = (".png", ".tif", ".tiff")
+PLAIN_VIEW = "3D"
+
+
+def _not_reserved(name: str) -> str:
+    if name in RESERVED:
+        raise ValueError(f"{name!r} is taken: the results folder uses {', '.join(RESERVED)}")
+    return name
+
+
+CaseId = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9_-]+$", description="unique id of the breast"), AfterValidator(_not_reserved)
+]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_EXCLUDE = Field(None, description="a reason; the row is kept, not run, and the report says why")
+
+
+class Row(BaseModel):
+    """A row of a table."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    def files(self) -> dict[str, Path]:
+        """The files that the row names, by column."""
+        return {name: value for name, value in self if isinstance(value, Path)}
+
+
+class CaseRow(Row):
+    """One breast."""
+
+    case: CaseId
+    laterality: Literal["L", "R"] = Field(description="side of the breast")
+    mr: Path = Field(description="undeformed MR volume: NIfTI, or a folder that holds one DICOM series")
+    mr_labels: Path | None = Field(
+        None,
+        description="NIfTI on the MR grid that replaces the automatic segmentation: "
+        "0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall",
+    )
+    mr_lesion: Path | None = Field(
+        None, description="NIfTI mask on the MR grid, or .tsv with name, x, y, z, diameter_mm (LPS, mm)"
+    )
+    mr_landmarks: Path | None = Field(None, description=".tsv with name, x, y, z (LPS, mm)")
+    mr_compressed: Path | None = Field(None, description="second MR volume of the breast between the plates")
+    mr_compressed_landmarks: Path | None = Field(None, description=".tsv with the same names in the second volume")
+    mr_surface_points: Path | None = Field(None, description=".tsv with points of the skin before compression")
+    mr_compressed_surface_points: Path | None = Field(None, description=".tsv with the same points between the plates")
+    compression: float | None = Field(
+        None, gt=0, lt=0.9, description="share of the uncompressed thickness that the plates take away, such as 0.21"
+    )
+    exclude: str | None = _EXCLUDE
+
+    def values(self) -> dict[str, str]:
+        """Columns that are values, as texts."""
+        return _texts({"compression": self.compression})
+
+
+class ViewRow(Row):
+    """One mammogram."""
+
+    case: CaseId
+    view: Literal["CC", "MLO"] = Field(description="projection")
+    image: Path = Field(description="DICOM mammogram, or .png/.tif with pixel_spacing_mm")
+    lesion: Path | None = Field(
+        None, description=".png mask of the image's size, or .tsv with name, column, row, diameter_mm"
+    )
+    landmarks: Path | None = Field(None, description=".tsv with name, column, row (pixel centres, first pixel 0 0)")
+    pixel_spacing_mm: Positive | None = Field(None, description="pixel spacing at the detector, mm")
+    thickness_mm: Positive | None = Field(None, description="distance of the plates, mm")
+    force_n: Positive | None = Field(None, description="plate force, N")
+    angle_deg: float | None = Field(None, ge=-90, le=90, description="projection angle, degree")
+    source_detector_mm: Positive | None = Field(None, description="source-to-detector distance, mm")
+    orientation: str | None = Field(
+        None,
+        pattern=r"^[APRLHF]{1,3}\\[APRLHF]{1,3}$",
+        description=r"row and column direction as stored, such as A\R, P\L, A\FR or P\FL",
+    )
+    exclude: str | None = _EXCLUDE
+
+    def values(self) -> dict[str, str]:
+        """Columns that are values, as texts."""
+        names = ("pixel_spacing_mm", "thickness_mm", "force_n", "angle_deg", "source_detector_mm", "orientation")
+        return _texts({name: getattr(self, name) for name in names})
+
+
+def _texts(values: Mapping[str, Any]) -> dict[str, str]:
+    return {name: str(value) for name, value in values.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Cohort:
+    """The cases and mammograms of two tables.
+
+    Attributes:
+        cases_file, views_file: the tables.
+        all_cases, all_views: every row, excluded ones too.
+    """
+
+    cases_file: Path
+    views_file: Path | None
+    all_cases: tuple[CaseRow, ...]
+    all_views: tuple[ViewRow, ...]
+
+    @cached_property
+    def cases(self) -> dict[str, CaseRow]:
+        """Cases that run, by id."""
+        return {row.case: row for row in self.all_cases if not row.exclude}
+
+    @cached_property
+    def mammograms(self) -> dict[tuple[str, str], ViewRow]:
+        """Mammograms of cases that run, by case and view."""
+        return {(row.case, row.view): row for row in self.all_views if not row.exclude and row.case in self.cases}
+
+    def views(self, case: str) -> list[str]:
+        """Views of a case: its mammograms, else 3D where a second volume or `compression` tells of plates."""
+        found = sorted(view for name, view in self.mammograms if name == case)
+        row = self.cases[case]
+        return found or ([PLAIN_VIEW] if row.mr_compressed or row.compression else [])
+
+
+def read_cohort(cases: Path, views: Path | None) -> Cohort:
+    """Read and check both tables.
+
+    Args:
+        cases: cases.tsv.
+        views: views.tsv; None for a cohort without mammograms.
+
+    Raises:
+        FaultsError: all that is wrong in them, at once.
+    """
+    faults: list[Fault] = []
+    case_rows, ids = _read_rows(cases, CaseRow, faults)
+    view_rows = _read_rows(views, ViewRow, faults)[0] if views else []
+    faults += _duplicates(cases, [(n, (row.case,)) for n, row in case_rows])
+    for number, row in case_rows:
+        faults += _orphans(cases, number, row)
+    if views:
+        faults += _view_faults(views, view_rows, ids, cases.name)
+    if not case_rows and not faults:
+        faults.append(Fault(cases.name, "the table has no row", "add one row per breast"))
+    if faults:
+        raise FaultsError(faults)
+    return Cohort(cases, views, tuple(row for _, row in case_rows), tuple(row for _, row in view_rows))
+
+
+AnyRow = TypeVar("AnyRow", bound=Row)
+
+
+def _read_rows(path: Path, model: type[AnyRow], faults: list[Fault]) -> tuple[list[tuple[int, AnyRow]], set[str]]:
+    """Good rows of a table with their line numbers, and the ids of all; what is wrong is added to `faults`."""
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            lines = [[cell.strip() for cell in line] for line in csv.reader(file, delimiter="\t")]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        faults.append(Fault(str(path), f"cannot be read ({reason})", "give a tab-separated table in UTF-8"))
+        return [], set()
+    header = lines[0] if lines else []
+    faults += _header_faults(path, header, model)
+    if _required(model) - set(header) or len(set(header)) < len(header):
+        return [], set()
+    filled = [(number, line) for number, line in enumerate(lines[1:], start=2) if any(line)]
+    column = header.index("case")
+    found = [(number, _row(path, number, header, line, model, faults)) for number, line in filled]
+    return [(n, row) for n, row in found if row], {line[column] for _, line in filled if column < len(line)}
+
+
+def _header_faults(path: Path, header: Sequence[str], model: type[Row]) -> list[Fault]:
+    columns, where = list(model.model_fields), f"{path.name} row 1"
+    faults = []
+    for name in header:
+        if name not in columns:
+            near = difflib.get_close_matches(name.lower(), columns, n=1, cutoff=0.0)[0]
+            faults.append(Fault(where, f"unknown column {name!r}", f"the nearest known one is {near!r}"))
+    for name in sorted({name for name in header if header.count(name) > 1}):
+        faults.append(Fault(where, f"column {name!r} is there twice", "keep one of them"))
+    for name in (name for name in columns if name in _required(model) and name not in header):
+        remedy = "add it, and separate columns by tabs" if len(header) < 2 else "add it"
+        faults.append(Fault(where, f"the required column {name!r} is missing", remedy))
+    return faults
+
+
+def _required(model: type[Row]) -> set[str]:
+    return {name for name, info in model.model_fields.items() if info.is_required()}
+
+
+def _row(
+    path: Path, number: int, header: Sequence[str], line: Sequence[str], model: type[AnyRow], faults: list[Fault]
+) -> AnyRow | None:
+    where = f"{path.name} row {number} ({line[0]})"
+    if len(line) > len(header):
+        what = f"{len(line)} cells under {len(header)} columns"
+        faults.append(Fault(where, what, "remove the surplus, or give each cell a column"))
+        return None
+    cells = {name: cell for name, cell in zip(header, line, strict=False) if cell and name in model.model_fields}
+    for name, info in model.model_fields.items():
+        if name in cells and info.annotation in (Path, Path | None):
+            cells[name] = os.path.normpath(path.parent / cells[name])
+    try:
+        return model.model_validate(cells)
+    except ValidationError as error:
+        faults += [_fault(where, model, dict(detail)) for detail in error.errors()]
+        return None
+
+
+def _fault(where: str, model: type[Row], detail: Mapping[str, Any]) -> Fault:
+    """A pydantic error in the words of the table's user."""
+    column = str(detail["loc"][0])
+    meaning = model.model_fields[column].description or ""
+    if detail["type"] == "missing":
+        return Fault(f"{where}, column {column}", "is empty", f"give it: {meaning}")
+    what = f"{detail['input']!r} is not permitted: {detail['msg'].removeprefix('Value error, ')}"
+    return Fault(f"{where}, column {column}", what, f"it is the {meaning}" if meaning else "correct it")
+
+
+def _duplicates(path: Path, keys: Iterable[tuple[int, tuple[str, ...]]]) -> list[Fault]:
+    first: dict[tuple[str, ...], int] = {}
+    faults = []
+    for number, key in keys:
+        if first.setdefault(key, number) != number:
+            what = f"{' '.join(key)} is already in row {first[key]}"
+            faults.append(Fault(f"{path.name} row {number}", what, "keep one of the rows, or exclude one view"))
+    return faults
+
+
+def _orphans(path: Path, number: int, row: CaseRow) -> list[Fault]:
+    """Columns that mean nothing without another one."""
+    needs = {
+        "mr_compressed_landmarks": ("mr_compressed", "mr_landmarks"),
+        "mr_surface_points": ("mr_compressed_surface_points", "mr_compressed"),
+        "mr_compressed_surface_points": ("mr_surface_points",),
+    }
+    return [
+        Fault(f"{path.name} row {number} ({row.case})", f"{column} is given without {other}", f"give {other} as well")
+        for column, others in needs.items()
+        for other in others
+        if getattr(row, column) and not getattr(row, other)
+    ]
+
+
+def _view_faults(path: Path, rows: Sequence[tuple[int, ViewRow]], cases: set[str], cases_name: str) -> list[Fault]:
+    faults = _duplicates(path, [(n, (row.case, row.view)) for n, row in rows if not row.exclude])
+    for number, row in rows:
+        where = f"{path.name} row {number} ({row.case} {row.view})"
+        if cases and row.case not in cases:
+            faults.append(Fault(where, f"no case {row.case!r} in {cases_name}", "add it there or correct the id"))
+        if row.image.suffix.lower() in PICTURES and row.pixel_spacing_mm is None:
+            what = "a picture has no header, and the column pixel_spacing_mm is empty"
+            faults.append(Fault(where, what, "give the pixel spacing at the detector in mm"))
+    return faults

@@ -1,0 +1,131 @@
+"""Mammograms from DICOM, PNG and TIFF files; nothing that identifies a patient is kept."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from pydicom import dcmread
+from pydicom.dataset import Dataset
+from pydicom.errors import InvalidDicomError
+
+from mammoreg.errors import DataError
+from mammoreg.geometry.frames import Laterality
+from mammoreg.imaging.mammogram_orientation import View
+from stages.cohort.readers.mammogram_header import MammogramFacts, mammogram_facts
+
+PICTURES = (".png", ".tif", ".tiff")
+
+
+@dataclass(frozen=True)
+class StoredMammogram:
+    """A mammogram as stored.
+
+    Attributes:
+        pixels: float32 (rows, columns), neither flipped nor inverted.
+        facts: what header and table say.
+    """
+
+    pixels: NDArray[np.float32]
+    facts: MammogramFacts
+
+
+def read_mammogram(path: Path, row: Mapping[str, str], laterality: Laterality, view: View) -> StoredMammogram:
+    """Read pixels and imaging facts of one mammogram.
+
+    Args:
+        path: DICOM file, PNG or TIFF.
+        row: columns of views.tsv, which override the header or stand in for one.
+
+    Raises:
+        DataError: If the file cannot be read, is no mammogram, or contradicts the table.
+    """
+    if is_picture(path):
+        return StoredMammogram(_picture_pixels(path), mammogram_facts(path, Dataset(), row, laterality, view))
+    header = _read_dicom(path, pixels=True)
+    facts = mammogram_facts(path, header, row, laterality, view)
+    return StoredMammogram(_dicom_pixels(path, header), facts)
+
+
+def read_mammogram_facts(path: Path, row: Mapping[str, str], laterality: Laterality, view: View) -> MammogramFacts:
+    """The imaging facts alone, without decoding pixels: what preflight asks for.
+
+    Raises:
+        DataError: As `read_mammogram`, but for faults of the pixels.
+    """
+    header = Dataset() if is_picture(path) else _read_dicom(path, pixels=False)
+    return mammogram_facts(path, header, row, laterality, view)
+
+
+def is_picture(path: Path) -> bool:
+    """Whether a file is taken for a PNG or TIFF picture, by its name."""
+    return path.suffix.lower() in PICTURES
+
+
+def _read_dicom(path: Path, *, pixels: bool) -> Dataset:
+    try:
+        header = dcmread(path, stop_before_pixels=not pixels)
+    except (OSError, InvalidDicomError, EOFError, ValueError) as error:
+        raise DataError(f"{path}: cannot be read as DICOM; name a DICOM mammogram, a .png or a .tif") from error
+    modality = str(header.get("Modality", "")).strip()
+    if modality != "MG":
+        raise DataError(f"{path}: modality is {modality or 'missing'}, not MG; name a mammogram")
+    if int(header.get("NumberOfFrames") or 1) > 1:
+        raise DataError(f"{path}: holds several frames; name a plain mammogram, not a tomosynthesis")
+    return header
+
+
+def _dicom_pixels(path: Path, header: Dataset) -> NDArray[np.float32]:
+    try:
+        pixels = np.asarray(header.pixel_array)
+    except (NotImplementedError, RuntimeError):
+        pixels = _decoded_by_itk(path)
+    except (AttributeError, ValueError, EOFError) as error:
+        raise DataError(f"{path}: pixels are missing or truncated; export the image again") from error
+    return _without_padding(_one_channel(path, pixels), header)
+
+
+def _decoded_by_itk(path: Path) -> NDArray[Any]:
+    """Pixels in a compression that needs GDCM, which SimpleITK brings."""
+    import SimpleITK
+
+    try:
+        return np.asarray(SimpleITK.GetArrayFromImage(SimpleITK.ReadImage(str(path)))[0])
+    except RuntimeError as error:
+        raise DataError(f"{path}: pixels cannot be decoded; export the image uncompressed") from error
+
+
+def _picture_pixels(path: Path) -> NDArray[np.float32]:
+    try:
+        with Image.open(path) as picture:
+            pixels = np.asarray(picture.convert("RGB") if picture.mode == "P" else picture)
+    except (OSError, ValueError, SyntaxError) as error:
+        raise DataError(f"{path}: cannot be read as a picture; export the image again as .png or .tif") from error
+    return _one_channel(path, pixels)
+
+
+def _one_channel(path: Path, pixels: NDArray[Any]) -> NDArray[np.float32]:
+    if pixels.ndim == 3 and pixels.shape[2] in (2, 3, 4):
+        grey = pixels[..., :1] if pixels.shape[2] == 2 else pixels[..., :3]
+        if np.any(grey != grey[..., :1]):
+            raise DataError(f"{path}: is a colour picture; export the mammogram in grey values")
+        pixels = grey[..., 0]
+    if pixels.ndim != 2:
+        raise DataError(f"{path}: pixels of shape {pixels.shape} are no single image; export one mammogram a file")
+    return pixels.astype(np.float32)
+
+
+def _without_padding(pixels: NDArray[np.float32], header: Dataset) -> NDArray[np.float32]:
+    """Padding pixels, which are no measurement, take the air's place: the nearest value that a pixel has."""
+    padding = header.get("PixelPaddingValue")
+    if padding is None:
+        return pixels
+    padded = pixels == float(padding)
+    if not padded.any() or padded.all():
+        return pixels
+    others = pixels[~padded]
+    nearest = others.min() if abs(others.min() - padding) < abs(others.max() - padding) else others.max()
+    return np.where(padded, nearest, pixels).astype(np.float32)

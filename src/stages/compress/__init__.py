@@ -1,0 +1,1 @@
+"""Stage `compress`: the breast between two rigid plates."""

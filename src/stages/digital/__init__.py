@@ -1,0 +1,1 @@
+"""Stage `digital`: a patient of the embedded digital cohort."""

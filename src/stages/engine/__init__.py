@@ -1,0 +1,1 @@
+"""What runs a stage and keeps what it leaves: contract, artefacts, configuration, digests."""

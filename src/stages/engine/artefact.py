@@ -1,0 +1,288 @@
+"""Artefacts: the self-describing HDF5 file that each stage leaves; the only module that imports h5py.
+
+Arrays and volumes carry `units` and `long_name`; volumes are netCDF-4 groups with LPS coordinates in mm. The same
+contents give the same bytes: no clock, no host, no absolute path.
+"""
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from mammoreg.geometry import Volume
+from stages.engine.errors import ArtefactError
+
+Status = Literal["ok", "not_converged", "failed"]
+Frame = Literal["LPS", "plate"]
+Value = None | bool | int | float | str | list[Any] | dict[str, Any]
+
+AXIS_NAMES = {
+    "LPS": {"x": "towards the patient's left", "y": "towards the patient's back", "z": "towards the patient's head"},
+    "plate": {"x": "medial along the plate", "y": "posterior", "z": "height towards the source"},
+}
+
+
+@dataclass(frozen=True)
+class Array:
+    """A numeric array with its units ("mm", "N", "kPa", "degree", "px", "1") and what it is."""
+
+    data: NDArray[Any]
+    units: str
+    long_name: str
+
+
+@dataclass(frozen=True)
+class VolumeField:
+    """A volume with the units of its samples, what it is and the frame of its grid."""
+
+    volume: Volume
+    units: str
+    long_name: str
+    frame: Frame = "LPS"
+
+
+@dataclass(frozen=True)
+class Fields:
+    """What a stage hands back.
+
+    Attributes:
+        arrays, volumes: by name; a "/" in a name makes a group.
+        values: JSON values by name, their units in the name (`thickness_mm`).
+        files: further files by name relative to the stage's folder (pictures, tables), with their bytes.
+        status, message: how the stage ended.
+    """
+
+    arrays: Mapping[str, Array] = field(default_factory=dict)
+    volumes: Mapping[str, VolumeField] = field(default_factory=dict)
+    values: Mapping[str, Value] = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    status: Status = "ok"
+    message: str = ""
+
+
+class Artefact:
+    """An artefact on disk, opened for reading; contents are read when asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            with h5py.File(path, "r", locking=False) as file:
+                self.attrs: dict[str, str] = {name: _text(value) for name, value in file.attrs.items()}
+                self._values = {name: json.loads(_text(node[()])) for name, node in file["values"].items()}
+            self.stage, self.case, self.message = (self.attrs[key] for key in ("stage", "case", "message"))
+            self.view = self.attrs["view"] or None
+            self.laterality = cast(Literal["L", "R"], self.attrs["laterality"])
+            self.status = cast(Status, self.attrs["status"])
+        except (OSError, KeyError, ValueError) as error:
+            raise ArtefactError(f"{path}: not an artefact of this pipeline; delete it and run again") from error
+
+    @property
+    def ok(self) -> bool:
+        """Whether the stage ended well."""
+        return self.status == "ok"
+
+    def names(self) -> list[str]:
+        """Names of the arrays, in the order of writing."""
+        return [name for name, _, _ in self.listing("arrays")]
+
+    def volume_names(self) -> list[str]:
+        """Names of the volumes, in the order of writing."""
+        return [name.rpartition("/")[0] for name, _, _ in self.listing("volumes") if _repeats_its_group(name)]
+
+    def value_names(self) -> list[str]:
+        """Names of the values, in the order of writing."""
+        return list(self._values)
+
+    def has(self, name: str) -> bool:
+        """Whether an array, a volume or a value of that name is there."""
+        return name in self._values or name in self.names() or name in self.volume_names()
+
+    def listing(self, group: Literal["arrays", "volumes"]) -> list[tuple[str, tuple[int, ...], dict[str, str]]]:
+        """Name, shape and text attributes of every dataset in a group."""
+        found: list[tuple[str, tuple[int, ...], dict[str, str]]] = []
+
+        def note(name: str, node: Any) -> None:
+            if isinstance(node, h5py.Dataset):
+                texts = {key: _text(node.attrs[key]) for key in ("units", "long_name", "frame") if key in node.attrs}
+                found.append((name, node.shape, texts))
+
+        with h5py.File(self.path, "r", locking=False) as file:
+            file[group].visititems(note)
+        return found
+
+    def value(self, name: str) -> Any:
+        """A JSON value."""
+        if name not in self._values:
+            raise self._missing("value", name, self.value_names())
+        return self._values[name]
+
+    def array(self, name: str, units: str) -> NDArray[Any]:
+        """An array, which must have been written in these units."""
+        with h5py.File(self.path, "r", locking=False) as file:
+            node = file["arrays"].get(name)
+            if not isinstance(node, h5py.Dataset):
+                raise self._missing("array", name, self.names())
+            self._check_units(name, _text(node.attrs["units"]), units)
+            return cast(NDArray[Any], node[()])
+
+    def volume(self, name: str, units: str | None = None, frame: Frame = "LPS") -> Volume:
+        """A volume in its frame; units are checked where given."""
+        with h5py.File(self.path, "r", locking=False) as file:
+            group = file["volumes"].get(name)
+            if group is None:
+                raise self._missing("volume", name, self.volume_names())
+            node = group[name.rpartition("/")[2]]
+            if units is not None:
+                self._check_units(name, _text(node.attrs["units"]), units)
+            if _text(node.attrs["frame"]) != frame:
+                raise ArtefactError(f"{self.path}: volume {name} is not in the {frame} frame")
+            return Volume(node[()], np.array(node.attrs["origin_mm"]), np.array(node.attrs["spacing_mm"]))
+
+    def _missing(self, kind: str, name: str, names: list[str]) -> ArtefactError:
+        return ArtefactError(f"{self.path}: no {kind} {name!r} in this artefact; it has {', '.join(names) or 'none'}")
+
+    def _check_units(self, name: str, found: str, asked: str) -> None:
+        if found != asked:
+            raise ArtefactError(f"{self.path}: {name} is in {found!r}, but {asked!r} was asked for")
+
+
+def write_artefact(path: Path, attrs: Mapping[str, str], fields: Fields) -> None:
+    """Write an artefact atomically: either the whole file appears under its name or nothing does.
+
+    Args:
+        path: the file; its folder is made.
+        attrs: root attributes.
+        fields: contents; `status` and `message` become root attributes.
+
+    Raises:
+        ArtefactError: the file cannot be written (disk full, no permission).
+    """
+    write_bytes(path, _image({**attrs, "status": fields.status, "message": fields.message}, fields))
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file atomically through a temporary one in the same folder.
+
+    Raises:
+        ArtefactError: the file cannot be written.
+    """
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o666 & ~_umask())
+        Path(temporary).replace(path)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise ArtefactError(
+            f"{path}: cannot be written ({error.strerror or error}); nothing is left behind: "
+            "make room or set the folder's permissions, then run again"
+        ) from error
+
+
+def _image(attrs: Mapping[str, str], fields: Fields) -> bytes:
+    """The bytes of the HDF5 file, built in memory so that a full disk cannot leave half a file."""
+    with h5py.File("artefact", "w", driver="core", backing_store=False, track_order=True) as file:
+        for name, text in attrs.items():
+            _set_text(file, name, text)
+        arrays, volumes, values = (file.create_group(n, track_order=True) for n in ("arrays", "volumes", "values"))
+        for name, array in fields.arrays.items():
+            _write_array(arrays, name, array)
+        for name, volume in fields.volumes.items():
+            _write_volume(volumes, name, volume)
+        for name, value in fields.values.items():
+            values.create_dataset(name, data=_fixed(json.dumps(_plain(value), allow_nan=False, ensure_ascii=False)))
+        file.flush()
+        return cast(bytes, file.id.get_file_image())
+
+
+def _write_array(parent: Any, name: str, array: Array) -> None:
+    node = _subgroup(parent, name).create_dataset(name.rpartition("/")[2], data=_storable(array.data))
+    _set_text(node, "units", array.units)
+    _set_text(node, "long_name", array.long_name)
+
+
+def _write_volume(parent: Any, name: str, field_: VolumeField) -> None:
+    volume, short = field_.volume, name.rpartition("/")[2]
+    group = parent.require_group(name)
+    data = _storable(volume.data)
+    # Raw floats hardly shrink and cost seconds; labels shrink a hundredfold.
+    compression = "gzip" if data.dtype.kind in "ui" else None
+    node = group.create_dataset(short, data=data, compression=compression)
+    texts = {"units": field_.units, "long_name": field_.long_name, "frame": field_.frame}
+    for key, text in texts.items():
+        _set_text(node, key, text)
+    node.attrs["origin_mm"] = np.asarray(volume.origin, dtype=float)
+    node.attrs["spacing_mm"] = np.asarray(volume.spacing, dtype=float)
+    for axis, (letter, meaning) in enumerate(AXIS_NAMES[field_.frame].items()):
+        positions = volume.origin[axis] + volume.spacing[axis] * np.arange(data.shape[axis])
+        scale = group.create_dataset(letter, data=positions)
+        scale.make_scale(letter)
+        _set_text(scale, "units", "mm")
+        _set_text(scale, "long_name", f"{field_.frame} {letter}, {meaning}")
+        node.dims[axis].attach_scale(scale)
+
+
+def _subgroup(parent: Any, name: str) -> Any:
+    folder = name.rpartition("/")[0]
+    return parent.require_group(folder) if folder else parent
+
+
+def _storable(data: NDArray[Any]) -> NDArray[Any]:
+    """Arrays in types that HDF5 and netCDF-4 share; booleans become bytes."""
+    array = np.ascontiguousarray(data)
+    if array.dtype.kind == "b":
+        return array.astype(np.uint8)
+    if array.dtype.kind not in "iuf":
+        raise TypeError(f"an artefact's arrays are numbers, not {array.dtype}; texts belong in values")
+    return array
+
+
+def _plain(value: Any) -> Any:
+    """JSON types for NumPy scalars and arrays; a number that is not finite becomes null."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def _fixed(text: str) -> NDArray[Any]:
+    """A fixed-length string: variable-length ones lie in a heap."""
+    encoded = text.encode()
+    return np.array(encoded, dtype=h5py.string_dtype("utf-8", max(1, len(encoded))))
+
+
+def _set_text(node: Any, name: str, text: str) -> None:
+    node.attrs.create(name, _fixed(text))
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _repeats_its_group(name: str) -> bool:
+    parts = name.split("/")
+    return len(parts) > 1 and parts[-1] == parts[-2]
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

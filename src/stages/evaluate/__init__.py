@@ -1,0 +1,1 @@
+"""Stage `evaluate`: predictions against the truth that the tables name."""

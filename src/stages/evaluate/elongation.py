@@ -1,0 +1,54 @@
+"""Elongation of the breast across the beam: model against mammogram."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from mammoreg.geometry import ViewGeometry, breast_to_plate
+from mammoreg.geometry.frames import Points
+from mammoreg.localization.deformation import MethodView
+from mammoreg.meshing.block import BlockMesh
+from mammoreg.metrics.elongation import Direction, extents_mm
+from mammoreg.pose.outline import RadialOutline
+from mammoreg.pose.silhouette import detector_mm
+from stages.engine.artefact import Artefact
+from stages.evaluate.fit import has_outline
+from stages.evaluate.predictions import Row
+from stages.methods import FINE_RAYS, pose_outline, view_geometry
+
+_METHODS = ("scaling", "plate", "updated")
+
+
+def elongation_rows(pose: Artefact, block: BlockMesh, methods: Mapping[str, MethodView]) -> list[Row]:
+    """Extents of each method's silhouette less those of the undeformed breast, and the mammogram's less the same.
+
+    All are measured on the rays on which the mammogram's outline is skin, and divided by the magnification at the
+    plates' middle; the undeformed breast is projected in parallel at the view's angle.
+    """
+    if not has_outline(pose):
+        return []
+    geometry, outline = view_geometry(pose), pose_outline(pose, FINE_RAYS)
+    standing = replace(geometry, parallel=True)
+    before = _extents(outline, breast_to_plate(block.points, geometry.angle_deg), block, standing)
+    true = extents_mm(outline.points(), outline.theta, outline.weight)
+    rows = []
+    for method in (m for m in _METHODS if m in methods):
+        after = _extents(outline, methods[method].deformation.forward(block.points), block, geometry)
+        for direction in before:
+            elongation = _difference(after[direction], before[direction], geometry)
+            known = _difference(true[direction], before[direction], geometry)
+            row = {"view": str(pose.view), "method": method, "direction": direction}
+            rows.append(row | {"elongation_mm": elongation, "true_mm": known})
+    return rows
+
+
+def _extents(
+    outline: RadialOutline, plate_points: Points, block: BlockMesh, geometry: ViewGeometry
+) -> dict[Direction, float | None]:
+    model = outline.of_model(detector_mm(plate_points, geometry), block.skin_quads())
+    return extents_mm(model.points(), outline.theta, outline.weight)
+
+
+def _difference(after: float | None, before: float | None, geometry: ViewGeometry) -> float | None:
+    if after is None or before is None:
+        return None
+    return (after - before) / geometry.middle_magnification

@@ -1,0 +1,112 @@
+"""Stage `evaluate`: predictions against the truth that the tables name; it alone reads both sides."""
+
+from typing import Any
+
+from pydantic import Field
+
+from mammoreg.localization.deformation import ReferenceMesh
+from stages.engine.artefact import Fields
+from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.evaluate.elongation import elongation_rows
+from stages.evaluate.fit import Limits, fit_rows
+from stages.evaluate.places import (
+    landmark_rows_in_compressed,
+    landmark_rows_in_mammogram,
+    lesion_rows_in_mammogram,
+    lesion_rows_in_mr,
+)
+from stages.evaluate.predictions import Predictions, Row
+from stages.marks import mr_landmarks, mr_lesions, view_areas, view_landmarks, view_lesion_names
+from stages.methods import block_mesh, method_views, of_view
+
+IMAGED = ("CC", "MLO")
+_PER_VIEW = ("pose", "compress", "shape", "solve", "project")
+
+
+class Settings(SettingsModel):
+    """When a view's result is marked as not to be trusted; what is measured is bound by the contract."""
+
+    outline_p95_limit_mm: float = Field(5.0, gt=0, description="95th percentile of the outline's misfit, mm")
+    beam_gap_limit_mm: float = Field(10.0, gt=0, description="gap of the beams to a lesion seen in two views, mm")
+    min_det_f_limit: float = Field(0.2, ge=0, le=1, description="smallest volume ratio in the deformed mesh")
+
+
+def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+    """Compare every prediction that has a truth; one that failed is a row with an empty distance."""
+    artefacts = [a for name in ("segment", "mesh", *_PER_VIEW, "localize") for a in inputs.artefacts(name)]
+    failed = [a for a in artefacts if not a.ok]
+    values: dict[str, Any] = {
+        "table_5_rows": _table_5(inputs),
+        "table_6_rows": _table_6(inputs),
+        "landmark_rows": _landmarks(inputs),
+        "view_rows": [],
+        "elongation_rows": [],
+    }
+    if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
+        values |= _per_view(inputs, settings)
+    if failed:
+        return Fields(values=values, status=failed[0].status, message=failed[0].message)
+    return Fields(values=values)
+
+
+def _table_5(inputs: Inputs) -> list[Row]:
+    predictions, lesions = Predictions(inputs.artefact("localize")), mr_lesions(inputs)
+    rows: list[Row] = []
+    for view in IMAGED:
+        pose = of_view(inputs.artefacts("pose"), view)
+        names = [name for name in view_lesion_names(inputs, view) if name in lesions]
+        areas = view_areas(inputs, pose) if pose else {}
+        rows += lesion_rows_in_mammogram(predictions, view, pose, areas, names)
+    return rows
+
+
+def _table_6(inputs: Inputs) -> list[Row]:
+    lesions = mr_lesions(inputs)
+    marked = {view: view_lesion_names(inputs, view) for view in IMAGED}
+    views_of = {name: [view for view in IMAGED if name in marked[view]] for name in lesions}
+    views_of = {name: views for name, views in views_of.items() if views}
+    return lesion_rows_in_mr(Predictions(inputs.artefact("localize")), lesions, views_of)
+
+
+def _landmarks(inputs: Inputs) -> list[Row]:
+    predictions, before = Predictions(inputs.artefact("localize")), mr_landmarks(inputs)
+    rows: list[Row] = []
+    for view in IMAGED:
+        truth = {n: p for n, p in view_landmarks(inputs, view).items() if n in before}
+        rows += landmark_rows_in_mammogram(predictions, view, of_view(inputs.artefacts("pose"), view), truth)
+    compressed = mr_landmarks(inputs, "mr_compressed_landmarks")
+    truth = {n: p for n, p in compressed.items() if n in before}
+    return rows + landmark_rows_in_compressed(predictions, before, truth)
+
+
+def _per_view(inputs: Inputs, settings: Settings) -> dict[str, list[Row]]:
+    """Fit and elongation of each view whose pose is known."""
+    results = [a for name in ("compress", "solve", "project") for a in inputs.artefacts(name)]
+    limits = Limits(settings.outline_p95_limit_mm, settings.beam_gap_limit_mm, settings.min_det_f_limit)
+    gaps = Predictions(inputs.artefact("localize")).beam_gaps()
+    block = block_mesh(inputs.artefact("mesh"))
+    reference = ReferenceMesh(block.points, block.hexes())
+    fits: list[Row] = []
+    elongations: list[Row] = []
+    for pose in sorted((p for p in inputs.artefacts("pose") if p.ok), key=lambda p: str(p.view)):
+        methods = method_views(pose, reference, results)
+        fits += fit_rows(pose, block, methods, results, gaps, limits)
+        elongations += elongation_rows(pose, block, methods)
+    return {"view_rows": fits, "elongation_rows": elongations}
+
+
+STAGE = Stage(
+    name="evaluate",
+    schema=1,
+    inputs=("segment", "mesh", "localize"),
+    optional=(
+        *_PER_VIEW,
+        "mr_lesion",
+        "mr_landmarks",
+        "mr_compressed_landmarks",
+        *(f"{kind}_{view}" for kind in ("lesion", "landmarks") for view in IMAGED),
+    ),
+    settings=Settings,
+    run=run,
+    takes_failed=True,
+)

@@ -1,1 +1,0 @@
-"""Comparisons of stage `evaluate`, one module per table; here alone predictions meet the truth."""

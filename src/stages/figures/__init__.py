@@ -1,0 +1,1 @@
+"""Stage `figures`: pictures and exports of a case."""

@@ -1,0 +1,1 @@
+"""Stage `localize`: where each side shows what the other marks."""

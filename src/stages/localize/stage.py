@@ -1,0 +1,112 @@
+"""Stage `localize`: where each side shows what the other marks. The three directions share no marks."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.localization.deformation import ReferenceMesh
+from mammoreg.meshing.block import BlockMesh
+from stages.engine.artefact import Artefact, Fields
+from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.localize.to_compressed import predict_in_compressed, second_volume
+from stages.localize.to_mammogram import predict_in_mammograms
+from stages.localize.to_mr import Anatomy, predict_in_mr
+from stages.localize.views import CaseViews, case_views
+from stages.marks import mr_landmarks, mr_lesions, view_areas, view_lesion_names
+from stages.methods import block_mesh
+
+_SKIN_PARTS = 6
+
+
+class Settings(SettingsModel):
+    """`localize` has no settings: what it predicts is bound by the contract."""
+
+
+def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+    """Predict in every direction for which the case has marks; what a failed view lacks is a row with its message."""
+    segment, mesh = inputs.artefact("segment"), inputs.artefact("mesh")
+    for artefact in (segment, mesh):
+        if not artefact.ok:
+            return Fields(status=artefact.status, message=artefact.message)
+    block = block_mesh(mesh)
+    per_view = [a for name in ("pose", "compress", "solve") for a in inputs.artefacts(name)]
+    poses = [a for a in per_view if a.stage == "pose"]
+    solutions = [a for a in per_view if a.stage != "pose"]
+    views = case_views(poses, solutions, ReferenceMesh(block.points, block.hexes()))
+    parts = [
+        _to_mammograms(inputs, views, segment.laterality),
+        _to_mr(inputs, views, segment, _skin(block, _SKIN_PARTS)),
+        _to_compressed(inputs, views, segment, block),
+    ]
+    return _joined(parts, per_view)
+
+
+def _to_mammograms(inputs: Inputs, views: CaseViews, laterality: Laterality) -> Fields:
+    """Reads `mr_lesion` and `mr_landmarks` alone."""
+    lesions = mr_lesions(inputs).items()
+    bodies = {name: lesion.between_lps_and_breast(laterality).body() for name, lesion in lesions}
+    return predict_in_mammograms(views, bodies, _landmarks(inputs, laterality))
+
+
+def _to_mr(inputs: Inputs, views: CaseViews, segment: Artefact, skin: Points) -> Fields:
+    """Reads the views' `lesion` alone."""
+    side = segment.laterality
+    anatomy = Anatomy(
+        side,
+        segment.volume("breast_mask").between_lps_and_breast(side),
+        lps_to_breast(segment.array("nipple", "mm"), side),
+        skin,
+        lps_to_breast(segment.array("chest_wall_surface", "mm"), side),
+    )
+    names_of = {view: view_lesion_names(inputs, view) for view in views.imaged}
+    return predict_in_mr(views, anatomy, names_of, {v: view_areas(inputs, pose) for v, pose in views.poses.items()})
+
+
+def _to_compressed(inputs: Inputs, views: CaseViews, segment: Artefact, block: BlockMesh) -> Fields:
+    """Reads `mr_landmarks` and the mask of the second volume alone."""
+    second = second_volume(segment, block)
+    if second is None:
+        return Fields()
+    return predict_in_compressed(views, second, _landmarks(inputs, segment.laterality), segment.laterality)
+
+
+def _landmarks(inputs: Inputs, laterality: Laterality) -> dict[str, Points]:
+    return {name: lps_to_breast(point, laterality) for name, point in mr_landmarks(inputs).items()}
+
+
+def _skin(block: BlockMesh, parts: int) -> Points:
+    fine = block.subdivide(parts)
+    return np.asarray(fine.points[fine.skin_nodes()])
+
+
+def _joined(parts: Sequence[Fields], per_view: Sequence[Artefact]) -> Fields:
+    """All predictions in one; the first view that failed gives its status, so that the case is named."""
+    failed = next((artefact for artefact in per_view if not artefact.ok), None)
+    return Fields(
+        arrays={name: array for part in parts for name, array in part.arrays.items()},
+        volumes={name: volume for part in parts for name, volume in part.volumes.items()},
+        values={name: value for part in parts for name, value in part.values.items()},
+        status=failed.status if failed else "ok",
+        message=failed.message if failed else "",
+    )
+
+
+STAGE = Stage(
+    name="localize",
+    schema=1,
+    inputs=("segment", "mesh"),
+    optional=(
+        "pose",
+        "compress",
+        "solve",
+        "mr_lesion",
+        "mr_landmarks",
+        "lesion_CC",
+        "lesion_MLO",
+    ),
+    settings=Settings,
+    run=run,
+    takes_failed=True,
+)

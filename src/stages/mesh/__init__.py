@@ -1,0 +1,1 @@
+"""Stage `mesh`: the breast as a block of hexahedra."""

@@ -1,1 +1,0 @@
-"""Pictures and exports of one case, made from its artefacts; one module per kind."""

@@ -1,0 +1,1 @@
+"""Stage `pose`: where the breast lay between the plates."""

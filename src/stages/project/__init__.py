@@ -1,0 +1,1 @@
+"""Stage `project`: X-ray projection of the deformed MR volume."""

@@ -1,0 +1,1 @@
+"""Stage `report`: the page that opens in any browser."""

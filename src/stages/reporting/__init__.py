@@ -1,1 +1,0 @@
-"""What stage `report` puts on its page: one module for the cohort, one for a case, one for texts about the run."""

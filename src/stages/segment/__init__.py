@@ -1,0 +1,1 @@
+"""Stage `segment`: breast, tissues, chest wall and nipple in the MR volume."""

@@ -1,0 +1,1 @@
+"""Stage `shape`: the 3-D surface that meets the mammogram's outline."""

@@ -1,0 +1,1 @@
+"""Stage `solve`: the interior under the estimated surface."""

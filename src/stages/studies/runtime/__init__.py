@@ -1,0 +1,1 @@
+"""Study `error_vs_runtime`: what more elements buy."""

@@ -1,0 +1,1 @@
+"""Study `stability`: the solver on stiff and extreme scenarios."""

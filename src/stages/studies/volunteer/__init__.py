@@ -1,0 +1,1 @@
+"""Study `paper_tables`: a volunteer's landmarks, Tables II to IV."""

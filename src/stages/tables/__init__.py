@@ -1,0 +1,1 @@
+"""Stage `tables`: the cohort's tables."""

@@ -1,0 +1,101 @@
+"""What each table of the cohort holds (contract, "What comes out")."""
+
+from stages.formats.table import Table
+
+_OVERLAP = {"overlap_percent": 1, "dice": 3, "size_ratio": 2}
+
+PREDICTIONS_MAMMOGRAM = Table(
+    "predictions_mammogram",
+    "Where each mammogram shows what is marked in the MR volume",
+    "localize",
+    "mammogram_rows",
+    ("view", "method", "name"),
+    {"column": 2, "row": 2, "radius_mm": 2},
+    ("seen", "message"),
+)
+PREDICTIONS_MR = Table(
+    "predictions_mr",
+    "Where in the MR volume the lesions marked in the mammograms lie",
+    "localize",
+    "mr_rows",
+    ("views", "method", "name"),
+    dict.fromkeys(
+        (
+            *("x", "y", "z", "radius_mm", "beam_gap_mm"),
+            *("nipple_distance_mm", "skin_depth_mm", "chest_wall_depth_mm"),
+        ),
+        2,
+    ),
+    ("clock", "message"),
+    (
+        *("case", "views", "method", "name", "x", "y", "z", "radius_mm", "beam_gap_mm", "nipple_distance_mm", "clock"),
+        *("skin_depth_mm", "chest_wall_depth_mm", "message"),
+    ),
+)
+PREDICTIONS_COMPRESSED = Table(
+    "predictions_compressed",
+    "Landmarks carried into the compressed MR volume",
+    "localize",
+    "compressed_rows",
+    ("method", "name"),
+    {"x": 2, "y": 2, "z": 2},
+)
+VIEWS = Table(
+    "views",
+    "Pose and fit of each view",
+    "evaluate",
+    "view_rows",
+    ("view", "method"),
+    {
+        **dict.fromkeys(("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm"), 2),
+        "force_n": 1,
+        "outline_mean_mm": 2,
+        "outline_p95_mm": 2,
+        "outline_dice": 3,
+        "ncc": 3,
+    },
+    ("trust",),
+)
+TABLE_5 = Table(
+    "table_5_mammogram",
+    "Table V: lesions in the mammograms",
+    "evaluate",
+    "table_5_rows",
+    ("view", "method", "name"),
+    {"distance_mm": 2, **_OVERLAP},
+)
+TABLE_6 = Table(
+    "table_6_mr",
+    "Table VI: lesions in the MR volumes",
+    "evaluate",
+    "table_6_rows",
+    ("views", "method", "name"),
+    {"distance_mm": 2, **_OVERLAP, "distance_to_curve_mm": 2},
+)
+ELONGATION = Table(
+    "elongation",
+    "Elongation of the breast across the beam",
+    "evaluate",
+    "elongation_rows",
+    ("view", "method", "direction"),
+    {"elongation_mm": 2, "true_mm": 2},
+)
+LANDMARKS = Table(
+    "landmarks",
+    "Landmarks with a truth",
+    "evaluate",
+    "landmark_rows",
+    ("view", "method", "landmark"),
+    {"distance_mm": 2},
+)
+
+TABLES = (
+    PREDICTIONS_MAMMOGRAM,
+    PREDICTIONS_MR,
+    PREDICTIONS_COMPRESSED,
+    VIEWS,
+    TABLE_5,
+    TABLE_6,
+    ELONGATION,
+    LANDMARKS,
+)

@@ -1,0 +1,59 @@
+"""Stage `tables`: the cohort's tables, from what `localize` and `evaluate` left of each case."""
+
+from collections.abc import Mapping, Sequence
+
+from stages.engine.artefact import Artefact, Fields
+from stages.engine.completion import first_failures
+from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
+from stages.formats.table import Row, Table
+from stages.tables.layout import LANDMARKS, TABLE_5, TABLE_6, TABLES
+from stages.tables.netcdf import cohort_netcdf
+from stages.tables.statistics import Group, groups, incomplete, readable_rows, statistics_rows
+
+_INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate")
+
+
+class Settings(SettingsModel):
+    """`tables` has no settings: the contract binds what it writes."""
+
+
+def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+    """Write every table, with or without truth; cases that failed are named first."""
+    artefacts = [artefact for name in _INPUTS for artefact in inputs.artefacts(name)]
+    rows_of = {table.name: table.rows(artefacts) for table in TABLES}
+    found = groups(*(rows_of[table.name] for table in (TABLE_5, TABLE_6, LANDMARKS)))
+    failures = _failures(artefacts)
+    files: dict[str, bytes] = {"cohort.nc": cohort_netcdf(rows_of)}
+    for table in TABLES:
+        files |= _files(table, rows_of[table.name], [g for g in found if g.table == table.name], failures)
+    statistics = [row for group in found for row in statistics_rows(group)]
+    overview = section_of("", statistics)
+    files["summary.csv"] = as_csv(overview.columns, overview.rows)
+    return Fields(files=files, values={"statistics": statistics, "failures": failures})
+
+
+def _failures(artefacts: Sequence[Artefact]) -> list[str]:
+    return [
+        f"{case}{f' {artefact.view}' if artefact.view else ''} {artefact.status}: {artefact.message}"
+        for (case, _), artefact in first_failures(artefacts).items()
+    ]
+
+
+def _files(table: Table, rows: Sequence[Row], found: Sequence[Group], failures: Sequence[str]) -> Mapping[str, bytes]:
+    """One table in its three forms; statistics come before the rows, and what is missing before all."""
+    first, sections = list(failures), []
+    for group in found:
+        statistics = statistics_rows(group)
+        first += incomplete(statistics)
+        sections.append(section_of(f"Statistics: {group.label}", readable_rows(statistics)))
+    text = cells(table, rows)
+    sections.append(Section("Measurements", table.columns, text))
+    return {
+        f"{table.name}.csv": as_csv(table.columns, text),
+        f"{table.name}.md": as_markdown(table.title, first, sections),
+        f"{table.name}.html": as_html(table.title, first, sections),
+    }
+
+
+STAGE = Stage(name="tables", schema=1, inputs=(), optional=_INPUTS, settings=Settings, run=run, takes_failed=True)

@@ -1,1 +1,0 @@
-"""How stage `tables` writes: what each table holds, its statistics, and its forms as CSV, text, HTML and netCDF."""
