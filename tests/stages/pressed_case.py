@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from mammoreg.breast.mechanics import BreastMechanics
+from mammoreg.breast.placed import closing_plates, place_breast
 from mammoreg.fem.plates.closing import ClosingOptions
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate, lps_to_breast
 from mammoreg.geometry.frames import Laterality
@@ -16,11 +18,9 @@ from mammoreg.meshing.locate import Locator
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.silhouette import detector_mm, quad_edges, ray_angles, silhouette
 from mammoreg.projection.cone_beam import project_volume
-from stages.compress.record import closing_plates
 from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
-from stages.mechanics import Mechanics, place_breast
 from tests.stages.synthetic_case import header
 from tests.unit.block_meshes import half_ellipsoid
 
@@ -46,7 +46,7 @@ class Pressed:
 
 @cache
 def pressed() -> Pressed:
-    alike = Mechanics(material="homogeneous")
+    alike = BreastMechanics(material="homogeneous")
     breast = place_breast(MESH, ANGLE, alike, MU)
     closed = closing_plates(breast, EDGE, alike, ClosingOptions()).close(GAP)
     view = ViewGeometry(ANGLE, EDGE, MIDDLE, closed.height_mm, GAP, 650.0, 15.0, PIXEL_MM, ROWS, COLUMNS)

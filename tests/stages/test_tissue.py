@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.materials.catalogue import CATALOGUE
 from mammoreg.materials.elastic import bulk_ratio
 from mammoreg.materials.tissue import MATERIALS, catalogue_tissue, neo_hookean_tissue
-from stages.mechanics import Mechanics
 
 GLAND = np.array([0.0, 0.25, 1.0])
 
@@ -69,4 +69,4 @@ def test_homogeneous_tissue_needs_no_map_and_a_contrast_keeps_the_mean():
     ("keys", "told"), [({}, True), ({"material": "homogeneous"}, False), ({"material": "lorenzen"}, True)]
 )
 def test_only_these_need_the_tissue_map(keys, told):
-    assert Mechanics(**keys).tells_gland_from_fat is told
+    assert BreastMechanics(**keys).tells_gland_from_fat is told

@@ -1,6 +1,8 @@
 """Into a compressed MR volume: placing a surface by that volume's outline, never by its intensities."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -8,12 +10,50 @@ from numpy.typing import NDArray
 from scipy import ndimage, optimize
 from scipy.spatial.transform import Rotation
 
-from mammoreg.geometry import Volume
+from mammoreg.geometry import Volume, plate_to_breast
 from mammoreg.geometry.frames import Points
-from mammoreg.localization.deformation import AffineDeformation
+from mammoreg.localization.deformation import AffineDeformation, MethodView
 
 Floats = NDArray[np.float64]
 _ROBUST_MM = 2.0
+
+
+@dataclass(frozen=True)
+class SecondVolume:
+    """The compressed volume as what is placed in it knows it, breast frame, mm.
+
+    Attributes:
+        mask: the body between the plates.
+        skin: points (N, 3) on the undeformed skin.
+        base_mm: of `fit_surface_to_outline`, for the shift.
+    """
+
+    mask: Volume
+    skin: Points
+    base_mm: float | None = None
+
+    @cached_property
+    def outline(self) -> Volume:
+        """Signed distance from the body's surface."""
+        return signed_distance(self.mask)
+
+    def rigid(self, points: Points) -> Points:
+        """Points (N, 3) of the undeformed breast by the best rigid fit of its skin."""
+        return fit_surface_to_outline(self.skin, self.outline, rotate=True).forward(points)
+
+    def place(self, way: MethodView, drawn_mm: Sequence[float], points: Points) -> Points:
+        """Points (N, 3) of the undeformed breast where a method and the mask put them."""
+        return drawn_to_breast(way, drawn_mm, points) + self.shift(way, drawn_mm)
+
+    def shift(self, way: MethodView, drawn_mm: Sequence[float]) -> Points:
+        """Displacement (3,) by which the mask places what a method has deformed."""
+        surface = drawn_to_breast(way, drawn_mm, self.skin)
+        return fit_surface_to_outline(surface, self.outline, rotate=False, base_mm=self.base_mm).offset
+
+
+def drawn_to_breast(way: MethodView, drawn: Sequence[float], points: Points) -> Points:
+    """Points (N, 3) of the undeformed breast between the plates, breast frame, from where the breast was drawn to."""
+    return plate_to_breast(way.deformation.forward(points) + np.asarray(drawn), way.geometry.angle_deg)
 
 
 def signed_distance(mask: Volume) -> Volume:

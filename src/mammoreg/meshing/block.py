@@ -75,6 +75,11 @@ class BlockMesh:
         points = np.einsum("pa,pac->pc", weights, self.points[self.hexes()[element.ravel()]])
         return BlockMesh(self.n * k, points)
 
+    def skin_points(self, k: int) -> Floats:
+        """Points (N, 3) on the skin, mm: its nodes and those that cut every face into k x k."""
+        fine = self.subdivide(k)
+        return np.asarray(fine.points[fine.skin_nodes()])
+
 
 def _quads(face: Indices) -> Indices:
     """Quadrilaterals of a face of nodes [u, v]; normals along u x v."""

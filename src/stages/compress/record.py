@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.breast.mechanics import BreastMechanics
+from mammoreg.breast.placed import PlacedBreast, closing_plates, place_breast
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.fem.plates.state import DampedState
 from stages.compress.gland_map import kept_gland_share
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Array, Value
-from stages.mechanics import Mechanics, PlacedBreast, place_breast
+from stages.mechanics import Mechanics
 from stages.methods import block_mesh
 
 Floats = NDArray[np.float64]
@@ -27,33 +29,10 @@ _MEMBRANE = "membrane"
 
 def placed_again(mesh: Artefact, compress: Artefact) -> PlacedBreast:
     """The breast as `compress` had it before the plates closed."""
-    mechanics = Mechanics.model_validate(compress.value("mechanics"))
+    mechanics = _kept_mechanics(compress)
     angle_deg, mu_kpa = float(compress.value("angle_deg")), float(compress.value("mu_kpa"))
     gland, compression = kept_gland_share(compress), float(compress.value("compression"))
     return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland, compression)
-
-
-def closing_plates(
-    breast: PlacedBreast,
-    edge_p_mm: float,
-    mechanics: Mechanics,
-    options: ClosingOptions,
-    lower_mm: float | None = None,
-) -> Closing:
-    """Plates around a placed breast; `lower_mm` is the lower plate's height where a second volume shows it."""
-    return Closing(
-        breast.model,
-        breast.contact_quads,
-        breast.back,
-        edge_p_mm if mechanics.plates_end else None,
-        mechanics.lip_radius_mm,
-        mechanics.friction if breast.skin.shear_passes else 0.0,
-        options,
-        lower_mm,
-        (*breast.loads, *breast.skin.parts),
-        breast.skin.extra_nodes,
-        mechanics.moving if lower_mm is None else "both",
-    )
 
 
 def kept_values(mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, angle_deg: float) -> dict[str, Value]:
@@ -64,6 +43,10 @@ def kept_values(mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, an
         "mu_kpa": mu_kpa,
         "angle_deg": angle_deg,
     }
+
+
+def _kept_mechanics(compress: Artefact) -> BreastMechanics:
+    return Mechanics.model_validate(compress.value("mechanics")).numerics()
 
 
 def kept_arrays(closed: Closed, lift: Floats) -> dict[str, Array]:
@@ -85,7 +68,7 @@ def _kept_memory(compress: Artefact) -> SoftMemory:
 
 def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closing, Closed]:
     """The plates and the breast between them as `compress` left them, in the floating breast's own height."""
-    mechanics = Mechanics.model_validate(compress.value("mechanics"))
+    mechanics = _kept_mechanics(compress)
     options = replace(ClosingOptions(), **_options(compress.value("options")))
     breast = placed_again(mesh, compress)
     closing = closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))

@@ -6,17 +6,19 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
+from mammoreg.breast.mechanics import BreastMechanics
+from mammoreg.breast.placed import closing_plates, place_breast
 from mammoreg.contact.soft import touching
 from mammoreg.errors import DataError
 from mammoreg.fem.plates.closing import Closed, ClosingOptions
 from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.meshing.block import BlockMesh
 from stages.compress.gland_map import gland_share, gland_share_array
-from stages.compress.record import closing_plates, kept_arrays, kept_values
+from stages.compress.record import kept_arrays, kept_values
 from stages.compress.solve_report import report_values, seconds_text
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.mechanics import Mechanics, place_breast
+from stages.mechanics import Mechanics
 from stages.methods import block_mesh, view_geometry
 
 
@@ -42,17 +44,18 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     view = view_geometry(pose)
     lower_mm = view.height_mm if pose.value("plates_known") else None
     mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
-    gland = gland_share(inputs) if settings.mechanics.tells_gland_from_fat else None
+    mechanics = settings.mechanics.numerics()
+    gland = gland_share(inputs) if mechanics.tells_gland_from_fat else None
     mesh = block_mesh(inputs.artefact("mesh"))
-    compression = _compression(mesh, view, settings.mechanics)
-    breast = place_breast(mesh, view.angle_deg, settings.mechanics, mu_kpa, gland, compression)
+    compression = _compression(mesh, view, mechanics)
+    breast = place_breast(mesh, view.angle_deg, mechanics, mu_kpa, gland, compression)
     options = replace(
         ClosingOptions(),
         steps=settings.load_steps,
         tolerance_mm=settings.tolerance_mm,
         penalty_per_mm=settings.penalty_per_mm * breast.stiffening,
     )
-    closing = closing_plates(breast, view.edge_p_mm, settings.mechanics, options, lower_mm)
+    closing = closing_plates(breast, view.edge_p_mm, mechanics, options, lower_mm)
     by_force = settings.stop == "force"
     closed = closing.close_to_force(_force_n(pose)) if by_force else closing.close(view.thickness_mm)
     print(seconds_text(closed.report), flush=True)
@@ -79,7 +82,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     )
 
 
-def _compression(mesh: BlockMesh, view: ViewGeometry, mechanics: Mechanics) -> float:
+def _compression(mesh: BlockMesh, view: ViewGeometry, mechanics: BreastMechanics) -> float:
     """Share of the thickness between the plates that they take away."""
     skin = breast_to_plate(mesh.points[mesh.skin_nodes()], view.angle_deg)
     low, high = touching(skin, view.edge_p_mm if mechanics.plates_end else None, mechanics.lip_radius_mm)

@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from mammoreg.geometry import lps_to_breast
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.deformation import ReferenceMesh
@@ -37,7 +35,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     views = case_views(poses, solutions, ReferenceMesh(block.points, block.hexes()))
     parts = [
         _to_mammograms(inputs, views, segment.laterality),
-        _to_mr(inputs, views, segment, _skin(block, _SKIN_PARTS)),
+        _to_mr(inputs, views, segment, block.skin_points(_SKIN_PARTS)),
         _to_compressed(inputs, views, segment, block),
     ]
     return _joined(parts, per_view)
@@ -74,11 +72,6 @@ def _to_compressed(inputs: Inputs, views: CaseViews, segment: Artefact, block: B
 
 def _landmarks(inputs: Inputs, laterality: Laterality) -> dict[str, Points]:
     return {name: lps_to_breast(point, laterality) for name, point in mr_landmarks(inputs).items()}
-
-
-def _skin(block: BlockMesh, parts: int) -> Points:
-    fine = block.subdivide(parts)
-    return np.asarray(fine.points[fine.skin_nodes()])
 
 
 def _joined(parts: Sequence[Fields], per_view: Sequence[Artefact]) -> Fields:

@@ -1,21 +1,22 @@
 """The coarse compression with which a pose is sought, as a function of the view."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
+from mammoreg.breast.mechanics import BreastMechanics
+from mammoreg.breast.placed import closing_plates, place_breast
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.plates.closing import COARSE, ClosingOptions
 from mammoreg.geometry import ViewGeometry
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.estimate import Compressed
-from stages.compress.record import closing_plates
-from stages.mechanics import Mechanics, place_breast
 
 CAREFUL = ClosingOptions(steps=16, tolerance_mm=0.2)
 """Where the coarse options do not converge."""
 
 
 def coarse_compression(
-    mesh: BlockMesh, mechanics: Mechanics, mu_kpa: float, *, plates_known: bool
+    mesh: BlockMesh, mechanics: BreastMechanics, mu_kpa: float, *, plates_known: bool
 ) -> Callable[[ViewGeometry], Compressed | None]:
     """A function that compresses the breast at a view's angle, edge and thickness; None where it does not converge.
 
@@ -25,7 +26,7 @@ def coarse_compression(
         mu_kpa: shear modulus.
         plates_known: the plates stand at the view's height, which a second volume shows.
     """
-    alike = mechanics.model_copy(update={"material": "homogeneous", "gland_contrast": 1.0, "skin": "none"})
+    alike = replace(mechanics, material="homogeneous", gland_contrast=1.0, skin="none")
 
     def compress(view: ViewGeometry) -> Compressed | None:
         breast = place_breast(mesh, view.angle_deg, alike, mu_kpa)

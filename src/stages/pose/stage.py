@@ -49,7 +49,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         return without_image(mesh, subject)
     nipple = lps_to_breast(segment.array("nipple", "mm"), subject.laterality)
     mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
-    compress = coarse_compression(mesh, settings.mechanics, mu_kpa, plates_known=seen.placed)
+    compress = coarse_compression(mesh, settings.mechanics.numerics(), mu_kpa, plates_known=seen.placed)
     start, estimated = start_view(seen, mesh, compress)
     tissue = coarse_tissue(segment, mesh) if settings.use_density and not seen.placed else None
     found = estimate_pose(

@@ -9,11 +9,12 @@ import numpy as np
 from mammoreg.geometry import lps_to_breast
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.deformation import MeshDeformation, MethodView, ReferenceMesh
+from mammoreg.localization.to_compressed import SecondVolume
 from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Inputs
 from stages.evaluate.elongation import elongation_rows
-from stages.localize.to_compressed import SecondVolume, drawn_mm, second_volume, view_in_second_volume
+from stages.localize.to_compressed import drawn_mm, second_volume, view_in_second_volume
 from stages.marks import mr_landmarks
 from stages.methods import block_mesh, view_geometry
 
