@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[1]
-EMBEDDED = [str(PROJECT / "config/digital/cases.tsv"), str(PROJECT / "config/digital/views.tsv")]
+EMBEDDED_VIEWS = PROJECT / "config/digital/views.tsv"
 
 
 def first_two_view_case(views: Path) -> str:
@@ -52,13 +52,13 @@ def rows(folder: Path) -> list[tuple[str, float, float, float]]:
 
 
 def main(arguments: list[str]) -> None:
-    if not arguments:
-        snakemake("--until", "segment")  # makes the digital patients' files
-    cases, views = arguments[:2] or EMBEDDED
-    case = arguments[2] if len(arguments) > 2 else first_two_view_case(Path(views))
+    keys = [f"{key}={path}" for key, path in zip(("cases", "views"), arguments, strict=False)]
+    case = arguments[2] if arguments else first_two_view_case(EMBEDDED_VIEWS)
     with tempfile.TemporaryDirectory() as folder:
-        target = str(Path(folder) / case / "localize.h5")
-        wall = snakemake(target, "--config", f"cases={cases}", f"views={views}", f"results={folder}")
+        keys.append(f"results={folder}")
+        if not arguments:
+            snakemake(f"{folder}/digital/{case}/digital.h5", "--config", *keys)  # makes the digital patient's files
+        wall = snakemake(f"{folder}/{case}/localize.h5", "--config", *keys)
         found = rows(Path(folder) / "benchmarks")
     print(f"{'stage':<16}{'wall s':>8}{'cpu s':>8}{'MB':>8}")
     for name, *numbers in found:

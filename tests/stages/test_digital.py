@@ -36,7 +36,7 @@ def rows(name):
 def named_files(case):
     """Files that the tables name for a case."""
     cells = [cell for row in (*rows("cases.tsv"), *rows("views.tsv")) if row["case"] == case for cell in row.values()]
-    return {cell.removeprefix(f"../../results/digital/{case}/") for cell in cells if "/" in cell}
+    return {cell.removeprefix(f"{case}/") for cell in cells if "/" in cell}
 
 
 @pytest.fixture(scope="module")

@@ -31,8 +31,10 @@ def checked(function, *arguments):
 
 
 CONFIG = checked(read_config, config)
-COHORT = checked(read_cohort, *CONFIG.table_files(PROJECT))
 RESULTS = Path(CONFIG.results)
+# Where the embedded cohort's files are made; a user's tables say for themselves where theirs lie.
+DIGITAL = RESULTS / "digital" if CONFIG.cases is None else None
+COHORT = checked(read_cohort, *CONFIG.table_files(PROJECT), DIGITAL)
 config["case_count"] = len(COHORT.cases)
 TABLES = {
     name: path
@@ -48,7 +50,7 @@ wildcard_constraints:
 
 def made_files():
     """Files of the tables that rule `digital` makes, by case; none unless the embedded cohort runs."""
-    if CONFIG.cases is not None:
+    if DIGITAL is None:
         return {}
     rows = (*COHORT.cases.values(), *COHORT.mammograms.values())
     found = {case: set() for case in COHORT.cases}

@@ -10,12 +10,12 @@ for case, files in MADE.items():
         name:
             f"digital_{case}"
         output:
-            str(PROJECT / "results" / "digital" / case / "digital.h5"),
+            str(DIGITAL / case / "digital.h5"),
             *map(made_output, files),
         log:
-            str(PROJECT / "results" / "digital" / "logs" / f"{case}.log"),
+            str(DIGITAL / "logs" / f"{case}.log"),
         benchmark:
-            str(PROJECT / "results" / "digital" / "benchmarks" / f"{case}.tsv")
+            str(DIGITAL / "benchmarks" / f"{case}.tsv")
         resources:
             mem_mb=lambda wildcards, attempt: 1500 * attempt,
             runtime=20,

@@ -133,19 +133,20 @@ class Cohort:
         return found or ([PLAIN_VIEW] if row.mr_compressed or row.compression else [])
 
 
-def read_cohort(cases: Path, views: Path | None) -> Cohort:
+def read_cohort(cases: Path, views: Path | None, files_in: Path | None = None) -> Cohort:
     """Read and check both tables.
 
     Args:
         cases: cases.tsv.
         views: views.tsv; None for a cohort without mammograms.
+        files_in: folder that the tables' paths are relative to; None: each table's own.
 
     Raises:
         FaultsError: all that is wrong in them, at once.
     """
     faults: list[Fault] = []
-    case_rows, ids = _read_rows(cases, CaseRow, faults)
-    view_rows = _read_rows(views, ViewRow, faults)[0] if views else []
+    case_rows, ids = _read_rows(cases, CaseRow, files_in, faults)
+    view_rows = _read_rows(views, ViewRow, files_in, faults)[0] if views else []
     faults += _duplicates(cases, [(n, (row.case,)) for n, row in case_rows])
     for number, row in case_rows:
         faults += _orphans(cases, number, row)
@@ -161,7 +162,9 @@ def read_cohort(cases: Path, views: Path | None) -> Cohort:
 AnyRow = TypeVar("AnyRow", bound=Row)
 
 
-def _read_rows(path: Path, model: type[AnyRow], faults: list[Fault]) -> tuple[list[tuple[int, AnyRow]], set[str]]:
+def _read_rows(
+    path: Path, model: type[AnyRow], files_in: Path | None, faults: list[Fault]
+) -> tuple[list[tuple[int, AnyRow]], set[str]]:
     """Good rows of a table with their line numbers, and the ids of all; what is wrong is added to `faults`."""
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
@@ -176,7 +179,8 @@ def _read_rows(path: Path, model: type[AnyRow], faults: list[Fault]) -> tuple[li
         return [], set()
     filled = [(number, line) for number, line in enumerate(lines[1:], start=2) if any(line)]
     column = header.index("case")
-    found = [(number, _row(path, number, header, line, model, faults)) for number, line in filled]
+    folder = path.parent if files_in is None else files_in
+    found = [(number, _row(path, number, header, line, model, folder, faults)) for number, line in filled]
     return [(n, row) for n, row in found if row], {line[column] for _, line in filled if column < len(line)}
 
 
@@ -200,7 +204,13 @@ def _required(model: type[Row]) -> set[str]:
 
 
 def _row(
-    path: Path, number: int, header: Sequence[str], line: Sequence[str], model: type[AnyRow], faults: list[Fault]
+    path: Path,
+    number: int,
+    header: Sequence[str],
+    line: Sequence[str],
+    model: type[AnyRow],
+    folder: Path,
+    faults: list[Fault],
 ) -> AnyRow | None:
     where = f"{path.name} row {number} ({line[0]})"
     if len(line) > len(header):
@@ -210,7 +220,7 @@ def _row(
     cells = {name: cell for name, cell in zip(header, line, strict=False) if cell and name in model.model_fields}
     for name, info in model.model_fields.items():
         if name in cells and info.annotation in (Path, Path | None):
-            cells[name] = os.path.normpath(path.parent / cells[name])
+            cells[name] = os.path.normpath(folder / cells[name])
     try:
         return model.model_validate(cells)
     except ValidationError as error:
