@@ -20,7 +20,14 @@ HEIGHT_MM = 2.0 * HALF_AXES_MM[2]
 COARSEST = 7
 MU_KPA, POISSON = 10.0, 0.49
 OPTIONS = ClosingOptions(
-    tolerance_mm=0.005, damping=1e-9, rests=1, stiffening=(), rule="nodes", steps=2, penalty_per_mm=100.0, band_mm=0.02
+    tolerance_mm=0.005,
+    damping=1e-9,
+    rests=1,
+    contact_factors=(),
+    rule="nodes",
+    steps=2,
+    penalty_per_mm=100.0,
+    band_mm=0.02,
 )
 
 

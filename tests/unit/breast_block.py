@@ -9,7 +9,9 @@ from mammoreg.materials.elastic import ElasticMaterial, neo_hookean
 from mammoreg.meshing.block import BlockMesh
 
 HEIGHT_MM = 110.0
-UNDAMPED = ClosingOptions(damping=1e-9, rests=1, stiffening=(), rule="nodes", steps=2, penalty_per_mm=20.0, band_mm=0.1)
+UNDAMPED = ClosingOptions(
+    damping=1e-9, rests=1, contact_factors=(), rule="nodes", steps=2, penalty_per_mm=20.0, band_mm=0.1
+)
 
 
 def breast_block(n: int) -> BlockMesh:

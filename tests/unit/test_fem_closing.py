@@ -127,7 +127,7 @@ def test_coarse_options_are_near_the_fine_ones(closed: Closed) -> None:
 
 
 def test_soft_contact_alone_lets_more_pass(closed: Closed) -> None:
-    soft = closing(breast(), options=ClosingOptions(stiffening=())).close(GAP)
+    soft = closing(breast(), options=ClosingOptions(contact_factors=())).close(GAP)
     assert closed.penetration_mm < 0.5 * soft.penetration_mm
     assert closed.iterations < 2 * soft.iterations
 

@@ -20,11 +20,11 @@ BACK = back_condition("slide_compression", MESH.points, MESH.back_quads(), along
 
 
 def test_augmentation_takes_penetration_back_with_the_same_penalty() -> None:
-    options = {n: ClosingOptions(stiffening=(), augmentations=n, penetration_mm=0.005) for n in (0, 8)}
+    options = {n: ClosingOptions(contact_factors=(), augmentations=n, penetration_mm=0.005) for n in (0, 8)}
     plain, augmented = (Closing(MODEL, MESH.skin_quads(), BACK, options=o).close(45.0) for o in options.values())
     assert augmented.penetration_mm < 0.005 < 0.3 < plain.penetration_mm
     assert augmented.iterations < 2 * plain.iterations
-    hard = ClosingOptions(penalty_per_mm=200.0, band_mm=0.02, stiffening=())
+    hard = ClosingOptions(penalty_per_mm=200.0, band_mm=0.02, contact_factors=())
     expected = Closing(MODEL, MESH.skin_quads(), BACK, options=hard).close(45.0)
     np.testing.assert_allclose(augmented.deformed, expected.deformed, atol=0.1)
     assert augmented.force_n[0] == pytest.approx(expected.force_n[0], rel=0.01)
@@ -149,7 +149,7 @@ def test_smooth_plates_remember_nothing_of_friction(monkeypatch: pytest.MonkeyPa
 
 
 def test_report_accounts_for_the_work_of_the_plates() -> None:
-    options = ClosingOptions(penalty_per_mm=100.0, band_mm=0.05, stiffening=())
+    options = ClosingOptions(penalty_per_mm=100.0, band_mm=0.05, contact_factors=())
     closing = Closing(MODEL, MESH.skin_quads(), BACK, options=options)
     results = [closing.close(gap) for gap in (46.0, 44.0)]
     work = 2.0 * float(np.mean([result.force_n for result in results]))

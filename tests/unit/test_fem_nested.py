@@ -6,7 +6,7 @@ import pytest
 from mammoreg.fem.plates import nested as fem_nested
 from mammoreg.fem.plates.closing import ClosingOptions
 from mammoreg.fem.plates.nested import close_nested, coarsened, nested_sizes
-from mammoreg.fem.plates.untangle import unfolded
+from mammoreg.fem.plates.untangle import untangled
 from mammoreg.materials.elastic import neo_hookean
 from tests.unit.breast_block import HEIGHT_MM, UNDAMPED, breast_block, breast_closing
 
@@ -37,7 +37,7 @@ def test_start_that_turns_elements_over_is_healed_or_made_at_a_wider_gap(
     healing: bool, steps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if not healing:
-        monkeypatch.setattr(fem_nested, "unfolded", lambda _model, positions, _held, _least: positions)
+        monkeypatch.setattr(fem_nested, "untangled", lambda _model, positions, _held, _least: positions)
     gap = 0.5 * HEIGHT_MM
     nested, direct = close_nested(breast_closing(12), gap), breast_closing(12).close(gap)
     assert nested[-1].steps == steps
@@ -52,10 +52,10 @@ def test_displacements_that_turn_elements_over_are_healed_around_them() -> None:
     positions[171] += [40.0, 0.0, 0.0]  # the middle
     assert model.determinants(positions).min() < 0.0
     held = np.zeros(positions.shape, dtype=bool)
-    healed = unfolded(model, positions, held, 0.1)
+    healed = untangled(model, positions, held, 0.1)
     assert model.determinants(healed).min() > 0.1
     np.testing.assert_allclose(healed, wanted, atol=1e-9)  # small strains keep what is affine around them
-    np.testing.assert_array_equal(unfolded(model, wanted, held, 0.1), wanted)
+    np.testing.assert_array_equal(untangled(model, wanted, held, 0.1), wanted)
 
 
 def test_heterogeneous_breast_with_friction_between_ending_plates() -> None:

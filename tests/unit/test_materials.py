@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mammoreg.materials.catalogue import CATALOGUE, SKIN, Tissue
+from mammoreg.materials.catalogue import CATALOGUE, SKIN, CatalogueTissue
 from mammoreg.materials.cube import SULLIVAN, cube_force_n, mu_for_force_kpa
 from mammoreg.materials.elastic import bulk_ratio, neo_hookean
 from mammoreg.materials.laws import Exponential, HardenedFat, Linear, NeoHookean
@@ -24,7 +24,7 @@ LAW_NAMES = {Exponential: "exponential", NeoHookean: "neo_hookean", Linear: "lin
 def test_constants_and_provenance_are_those_of_the_reference(model: str) -> None:
     reference = json.loads(REFERENCE.read_text())["models"][model]["tissues"]
     for name in ("fat", "gland"):
-        tissue: Tissue = getattr(CATALOGUE[model], name)
+        tissue: CatalogueTissue = getattr(CATALOGUE[model], name)
         entry = reference.get(name, reference.get("all"))
         hardened = isinstance(tissue.law, HardenedFat)
         law = tissue.law.fat if isinstance(tissue.law, HardenedFat) else tissue.law

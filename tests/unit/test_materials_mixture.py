@@ -37,7 +37,7 @@ def test_tissue_without_a_share_is_not_evaluated() -> None:
     [
         ([[0.5, 0.4]], "add up"),
         ([[1.0, 0.0], [1.5, -0.5]], "element 1"),
-        ([[1.0]], "shares"),
+        ([[1.0]], "fractions"),
     ],
 )
 def test_impossible_shares_are_refused(shares: list[list[float]], message: str) -> None:

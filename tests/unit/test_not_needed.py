@@ -26,7 +26,7 @@ from mammoreg.materials.fibres import Fibres
 from mammoreg.materials.neo_hookean import NeoHookean
 from tests.unit.fe_bodies import block
 
-QUICK = ClosingOptions(steps=2, tolerance_mm=0.5, rests=2, stiffening=())
+QUICK = ClosingOptions(steps=2, tolerance_mm=0.5, rests=2, contact_factors=())
 
 
 class NotNeededError(Exception):

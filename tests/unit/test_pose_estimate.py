@@ -11,7 +11,7 @@ from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.meshing.locate import Locator
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.density import DensityImage, mammogram_structure
-from mammoreg.pose.estimate import Compressed, PoseEstimate, Tissue, estimate_pose
+from mammoreg.pose.estimate import Compressed, DenseTissue, PoseEstimate, estimate_pose
 from mammoreg.pose.outline import RadialOutline, radial_outline
 from mammoreg.pose.silhouette import detector_mm, ray_angles
 from tests.unit.block_meshes import half_ellipsoid
@@ -73,13 +73,13 @@ def _grains() -> np.ndarray:
 
 
 @cache
-def tissue_of(half_axes: tuple[float, float, float]) -> Tissue:
+def tissue_of(half_axes: tuple[float, float, float]) -> DenseTissue:
     mesh = breast(half_axes)
     axis = np.arange(-90.0, 90.1, 3.0)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     element, local, inside = Locator(mesh.points, mesh.hexes()).locate(grid)
     excess = (np.linalg.norm(grid[inside, None] - BLOBS, axis=2).min(axis=1) < 9.0).astype(float)
-    return Tissue(mesh.hexes(), element[inside], local[inside], excess)
+    return DenseTissue(mesh.hexes(), element[inside], local[inside], excess)
 
 
 def search(

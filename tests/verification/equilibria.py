@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, State
+from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, PrescribedState
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -67,9 +67,9 @@ def solve(
 
     Loads grow from zero, held components come from where the start has them, else from the undeformed body.
     """
-    state = State(model.points, np.zeros(len(model.hexes)))
+    state = PrescribedState(model.points, np.zeros(len(model.hexes)))
     if start is not None:
-        state = State(start.deformed, start.pressure)
+        state = PrescribedState(start.deformed, start.pressure)
     if held.all():
         return _imposed(model, held, targets)
     origin, iterations = state.positions, 0
@@ -84,7 +84,7 @@ def solve(
 def _imposed(model: HyperelasticModel, held: NDArray[np.bool_], places: Floats) -> Solved:
     """Where nothing is free, the pressures follow from the volumes and the rest from the reactions."""
     volume = (model.weights * model.determinants(places)).sum(axis=1) / model.volume
-    state = State(places, model.material.bulk_kpa * (volume - 1.0))
+    state = PrescribedState(places, model.material.bulk_kpa * (volume - 1.0))
     return Solved(places, state.pressure, Equilibrium(model, held).reaction(state), 0)
 
 

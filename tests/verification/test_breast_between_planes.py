@@ -14,7 +14,7 @@ from tests.verification.febio import HEIGHT_MM, HalfEllipsoid, half_ellipsoid
 
 pytestmark = requires_shared("fe")
 
-UNDAMPED = ClosingOptions(damping=1e-9, rests=1, stiffening=(), rule="nodes")
+UNDAMPED = ClosingOptions(damping=1e-9, rests=1, contact_factors=(), rule="nodes")
 PRECISE = replace(UNDAMPED, steps=4, penalty_per_mm=100.0, band_mm=0.02)
 LARGE_STEPS = replace(UNDAMPED, steps=2, penalty_per_mm=20.0, band_mm=0.1)
 

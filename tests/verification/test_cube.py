@@ -9,7 +9,7 @@ from mammoreg.fem.parts.back import held_back
 from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.fem.prescribed.cube import press_cube
 from mammoreg.fem.prescribed.solve import solve_prescribed
-from mammoreg.materials.catalogue import CATALOGUE, Tissue
+from mammoreg.materials.catalogue import CATALOGUE, CatalogueTissue
 from mammoreg.materials.cube import CUBE_MM3, HIGH_COMPRESSION, LOW_COMPRESSION, cube_force_n
 from mammoreg.materials.elastic import bulk_ratio, hyperelastic, neo_hookean, tangent_bulk_kpa
 from mammoreg.materials.laws import NeoHookean
@@ -50,7 +50,7 @@ def squeezed_by_plates(poisson: float, friction: float, options: ClosingOptions)
 def test_sliding_faces_give_the_closed_form(poisson: float, febio_n: float) -> None:
     expected = uniaxial_force_n(10.0, poisson, 0.5)
     assert expected == pytest.approx(febio_n, abs=0.001)
-    closed = squeezed_by_plates(poisson, 0.0, ClosingOptions(penalty_per_mm=200.0, band_mm=0.02, stiffening=()))
+    closed = squeezed_by_plates(poisson, 0.0, ClosingOptions(penalty_per_mm=200.0, band_mm=0.02, contact_factors=()))
     assert closed.force_n == pytest.approx((expected, expected), rel=0.005)
 
 
@@ -92,7 +92,9 @@ TABLE_1 = [
 
 
 @pytest.mark.parametrize(("tissue", "compression", "paper_n"), TABLE_1)
-def test_table_1_by_law_and_by_finite_elements(tissue: Tissue, compression: float, paper_n: float | None) -> None:
+def test_table_1_by_law_and_by_finite_elements(
+    tissue: CatalogueTissue, compression: float, paper_n: float | None
+) -> None:
     law = tissue.law
     expected = cube_force_n(law, compression)
     if paper_n is not None:

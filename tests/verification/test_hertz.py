@@ -23,7 +23,14 @@ from tests.verification.hex_bodies import Floats, brick
 MU, RADIUS, THICK, WIDTH = 10.0, 500.0, 80.0, 200.0
 DEPTH, ELEMENTS, SMALLEST = 0.05, 13, 0.9
 STIFF = ClosingOptions(
-    steps=2, tolerance_mm=1e-5, damping=1e-9, rests=2, stiffening=(), penalty_per_mm=2000.0, band_mm=1e-4, rule="nodes"
+    steps=2,
+    tolerance_mm=1e-5,
+    damping=1e-9,
+    rests=2,
+    contact_factors=(),
+    penalty_per_mm=2000.0,
+    band_mm=1e-4,
+    rule="nodes",
 )
 
 

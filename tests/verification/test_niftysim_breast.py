@@ -29,7 +29,7 @@ from tests.verification.niftysim import LOWER_MM, UPPER_MM, WEIGHT, Floats, Pend
 pytestmark = [requires_shared("fe"), pytest.mark.slow]
 ELEMENTS = 10
 BODY_CM3 = 599.2
-OPTIONS = ClosingOptions(steps=4, damping=1e-6, rests=1, stiffening=(), penalty_per_mm=50.0, band_mm=0.05)
+OPTIONS = ClosingOptions(steps=4, damping=1e-6, rests=1, contact_factors=(), penalty_per_mm=50.0, band_mm=0.05)
 
 
 @dataclass(frozen=True)

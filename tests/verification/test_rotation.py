@@ -58,7 +58,9 @@ def squeezed(mesh: BlockMesh, turn: Floats, friction: float) -> tuple[Floats, tu
     """A block between plates, held at nine nodes in the middle, turned about the plates' normal."""
     nodes = np.flatnonzero((np.abs(mesh.points) < [15.1, 15.1, 0.1]).all(axis=1))
     model = HyperelasticModel(mesh.points @ turn.T, mesh.hexes(), neo_hookean(10.0, 0.49))
-    options = ClosingOptions(damping=1e-9, rests=2, tolerance_mm=1e-8, stiffening=(), penalty_per_mm=20.0, band_mm=0.5)
+    options = ClosingOptions(
+        damping=1e-9, rests=2, tolerance_mm=1e-8, contact_factors=(), penalty_per_mm=20.0, band_mm=0.5
+    )
     back = held_back(nodes, np.ones(3, dtype=bool))
     closed = Closing(model, mesh.skin_quads(), back, friction=friction, options=options, lower_mm=-21.0).close(42.0)
     return closed.deformed, closed.force_n

@@ -14,7 +14,7 @@ from mammoreg.fem.plates.closing import Closing, ClosingOptions
 from mammoreg.fem.skin.law import TensionLinear
 from mammoreg.fem.skin.models import SkinModel, skin_model
 from mammoreg.geometry import breast_to_plate
-from mammoreg.materials.tissue import Tissue, catalogue_tissue, neo_hookean_tissue
+from mammoreg.materials.tissue import BreastTissue, catalogue_tissue, neo_hookean_tissue
 from mammoreg.meshing.block import BlockMesh
 
 Floats = NDArray[np.float64]
@@ -31,7 +31,7 @@ class PlacedBreast:
         back_quads: faces (F, 4) there.
         skin: what its skin adds, and the faces that meet the plates.
         loads: its weight, where it counts.
-        stiffening: shear modulus at the compression to come over the initial one.
+        stiffness_ratio: shear modulus at the compression to come over the initial one.
     """
 
     model: HyperelasticModel
@@ -39,7 +39,7 @@ class PlacedBreast:
     back_quads: NDArray[np.int64]
     skin: SkinModel
     loads: tuple[Part, ...] = ()
-    stiffening: float = 1.0
+    stiffness_ratio: float = 1.0
 
     @property
     def contact_quads(self) -> NDArray[np.int64]:
@@ -79,7 +79,7 @@ def place_breast(
     law = TensionLinear(mechanics.skin_modulus_kpa)
     skin = skin_model(mechanics.skin, model, mesh.skin_quads(), law, mechanics.skin_thickness_mm)
     loads = (_standing_up(model, mechanics.density_kg_m3, angle_deg),) if mechanics.gravity == "standing" else ()
-    return PlacedBreast(model, back, mesh.back_quads(), skin, loads, tissue.stiffening)
+    return PlacedBreast(model, back, mesh.back_quads(), skin, loads, tissue.stiffness_ratio)
 
 
 def closing_plates(
@@ -111,7 +111,7 @@ def _standing_up(model: HyperelasticModel, density_kg_m3: float, angle_deg: floa
     return gravity(model, density_kg_m3 * float(np.linalg.norm(change)), change)
 
 
-def _tissue(mechanics: BreastMechanics, mu_kpa: float, gland: Floats | None, compression: float) -> Tissue:
+def _tissue(mechanics: BreastMechanics, mu_kpa: float, gland: Floats | None, compression: float) -> BreastTissue:
     if mechanics.material == "homogeneous":
         return neo_hookean_tissue(mu_kpa, mechanics.poisson_ratio)
     if mechanics.material == "fat_and_gland":

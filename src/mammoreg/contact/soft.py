@@ -204,10 +204,10 @@ class SoftContact:
         size = np.linalg.norm(trial, axis=-1)
         safe = np.where(size > 0.0, size, 1.0)
         slides = size > limit
-        share = np.where(slides, np.where(slides, limit, 0.0) / safe, 1.0)
+        fraction = np.where(slides, np.where(slides, limit, 0.0) / safe, 1.0)
         direction = trial / safe[..., None]
         along = np.where(slides[..., None, None], direction[..., :, None] * direction[..., None, :], 0.0)
-        return trial * share[..., None], (share * stick)[..., None, None] * (plane - along)
+        return trial * fraction[..., None], (fraction * stick)[..., None, None] * (plane - along)
 
     def _friction_energy(self, plate: Plate, memory: SoftMemory, k: int, slip: Array) -> Array:
         """Potential per area, mN/mm, of `_friction`."""

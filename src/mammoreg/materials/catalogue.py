@@ -23,7 +23,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Tissue:
+class CatalogueTissue:
     """Law of one tissue; `sources` by the names of the law's constants."""
 
     law: Law
@@ -44,28 +44,28 @@ class TissueModel:
         table_1: forces that the paper prints for it, N: fat at 21 % and gland at 50 %; empty where it prints none.
     """
 
-    fat: Tissue
-    gland: Tissue
+    fat: CatalogueTissue
+    gland: CatalogueTissue
     table_1: Mapping[str, float] = field(default_factory=dict)
 
 
 _WELLMAN_MODULUS = "cited from Wellman 1999 in github.com/eloygarcia/RadboudCompression and thesis-Registration"
 _FAT_LAW, _GLAND_LAW = Exponential(4.46, 7.4), Exponential(15.1, 12.3)
-_WELLMAN_FAT = Tissue(
+_WELLMAN_FAT = CatalogueTissue(
     _FAT_LAW,
     {
         "b_kpa": Source("published", f"4.46 kPa {_WELLMAN_MODULUS}"),
         "m": Source("memory", "reproduces Table I exactly"),
     },
 )
-_WELLMAN_GLAND = Tissue(
+_WELLMAN_GLAND = CatalogueTissue(
     _GLAND_LAW,
     {
         "b_kpa": Source("published", f"15.1 kPa {_WELLMAN_MODULUS}"),
         "m": Source("table_1_implied", "12.2989 to 12.3000 with b = 15.1 kPa; Azar's tables are said to give 10.0"),
     },
 )
-_AZAR_FAT = Tissue(
+_AZAR_FAT = CatalogueTissue(
     HardenedFat(_FAT_LAW, _GLAND_LAW, onset=0.21, b_kpa=4.46, m=12.3),
     {
         "fat.b_kpa": _WELLMAN_FAT.sources["b_kpa"],
@@ -78,16 +78,16 @@ _AZAR_FAT = Tissue(
 _FORCES_WELLMAN = {"fat": 9.0, "gland": 2217.0}
 
 
-def _from_table_1(law: Law, name: str, note: str) -> Tissue:
-    return Tissue(law, {name: Source("table_1_implied", note)})
+def _from_table_1(law: Law, name: str, note: str) -> CatalogueTissue:
+    return CatalogueTissue(law, {name: Source("table_1_implied", note)})
 
 
-def _lorenzen(modulus_kpa: float, allowed: str) -> Tissue:
+def _lorenzen(modulus_kpa: float, allowed: str) -> CatalogueTissue:
     note = f"Table I alone allows {allowed} kPa"
-    return Tissue(Linear(modulus_kpa), {"e_kpa": Source("memory", note)})
+    return CatalogueTissue(Linear(modulus_kpa), {"e_kpa": Source("memory", note)})
 
 
-_HOMOGENEOUS = Tissue(
+_HOMOGENEOUS = CatalogueTissue(
     NeoHookean(10.8), {"mu_kpa": Source("assumption", "least squares to Bakic's linear gland, 60 kPa, over 0 to 50 %")}
 )
 
@@ -101,7 +101,7 @@ CATALOGUE: Mapping[str, TissueModel] = {
     ),
     "krouskop": TissueModel(
         _from_table_1(Linear(17.3), "e_kpa", "16.65 to 17.88 kPa; constant over strain in the abstract"),
-        Tissue(
+        CatalogueTissue(
             Exponential(20.65, 6.09),
             {
                 "b_kpa": Source("table_1_implied", "one-parameter family, anchored at 28 kPa for 5 % (memory)"),
@@ -119,6 +119,6 @@ CATALOGUE: Mapping[str, TissueModel] = {
     "homogeneous": TissueModel(_HOMOGENEOUS, _HOMOGENEOUS),
 }
 
-SKIN = Tissue(
+SKIN = CatalogueTissue(
     Linear(10.0), {"e_kpa": Source("published", "the paper, section II-D, after Samani: constant below 50 % strain")}
 )

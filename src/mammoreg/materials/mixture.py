@@ -1,4 +1,4 @@
-"""Elements of mixed tissue: energies weighted by the tissues' shares of the volume."""
+"""Elements of mixed tissue: energies weighted by the tissues' fractions of the volume."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,34 +11,36 @@ from mammoreg.materials.isochoric import Array, IsochoricLaw
 
 @dataclass(frozen=True)
 class TissueMixture:
-    """W = sum of share_t W_t(I1bar), one mixture per element (equal strain in all tissues).
+    """W = sum of fraction_t W_t(I1bar), one mixture per element (equal strain in all tissues).
 
     Attributes:
         laws: of T tissues.
-        shares: (E, T), not negative, each row's sum 1.
+        fractions: of the volume (E, T), not negative, each row's sum 1.
 
     Raises:
-        ValueError: other shapes, or shares that are not such.
+        ValueError: other shapes, or fractions that are not such.
     """
 
     laws: tuple[IsochoricLaw, ...]
-    shares: Array
+    fractions: Array
 
     def __post_init__(self) -> None:
-        if self.shares.ndim != 2 or self.shares.shape[1] != len(self.laws):
-            raise ValueError(f"{len(self.laws)} tissues need shares (E, {len(self.laws)}), not {self.shares.shape}")
-        wrong = np.flatnonzero((self.shares < -1e-9).any(axis=1) | ~np.isclose(self.shares.sum(axis=1), 1.0))
+        if self.fractions.ndim != 2 or self.fractions.shape[1] != len(self.laws):
+            raise ValueError(
+                f"{len(self.laws)} tissues need fractions (E, {len(self.laws)}), not {self.fractions.shape}"
+            )
+        wrong = np.flatnonzero((self.fractions < -1e-9).any(axis=1) | ~np.isclose(self.fractions.sum(axis=1), 1.0))
         if wrong.size:
-            raise ValueError(f"element {wrong[0]}: shares of tissue must not be negative and add up to 1")
+            raise ValueError(f"element {wrong[0]}: fractions of tissue must not be negative and add up to 1")
 
     @property
     def mu_kpa(self) -> Array:
         """Initial shear modulus (E,)."""
-        return np.asarray(self.shares @ np.array([law.mu_kpa for law in self.laws]))
+        return np.asarray(self.fractions @ np.array([law.mu_kpa for law in self.laws]))
 
     def part(self, elements: slice | NDArray[np.integer]) -> "TissueMixture":
         """The mixture of some elements."""
-        return TissueMixture(self.laws, self.shares[elements])
+        return TissueMixture(self.laws, self.fractions[elements])
 
     def energy_kpa(self, i1: Array) -> Array:
         """W at I1bar (E, Q)."""
@@ -53,12 +55,12 @@ class TissueMixture:
         return self._sum([law.curvature_kpa for law in self.laws], i1)
 
     def _sum(self, functions: list[Callable[[Array], Array]], i1: Array) -> Array:
-        """A tissue costs nothing where it has no share."""
+        """A tissue costs nothing where it has none."""
         total = np.zeros(i1.shape)
-        for share, function in zip(self.shares.T, functions, strict=True):
-            there = np.flatnonzero(share)
-            if there.size == len(share):
-                total += share[:, None] * function(i1)
+        for fraction, function in zip(self.fractions.T, functions, strict=True):
+            there = np.flatnonzero(fraction)
+            if there.size == len(fraction):
+                total += fraction[:, None] * function(i1)
             elif there.size:
-                total[there] += share[there, None] * function(i1[there])
+                total[there] += fraction[there, None] * function(i1[there])
         return total

@@ -20,25 +20,27 @@ MATERIALS: tuple[PaperMaterial, ...] = get_args(PaperMaterial)
 
 
 @dataclass(frozen=True)
-class Tissue:
+class BreastTissue:
     """A material, and how stiff it is.
 
     Attributes:
         material: of the elements, without fibres.
         mu_kpa: shear modulus of the whole at the compression to come: the neo-Hookean one of the same stress.
-        stiffening: slope of the stress there over the initial one.
+        stiffness_ratio: slope of the stress there over the initial one.
     """
 
     material: ElasticMaterial
     mu_kpa: float
-    stiffening: float = 1.0
+    stiffness_ratio: float = 1.0
 
-    def with_fibres(self, direction: Floats, ratio: float) -> "Tissue":
+    def with_fibres(self, direction: Floats, ratio: float) -> "BreastTissue":
         """The tissue with fibres along a direction (3,), `ratio` times as stiff in tension as the whole in shear."""
         return replace(self, material=replace(self.material, fibres=Fibres(direction, ratio * self.mu_kpa)))
 
 
-def neo_hookean_tissue(mu_kpa: float, poisson: float, contrast: float = 1.0, gland: Floats | None = None) -> Tissue:
+def neo_hookean_tissue(
+    mu_kpa: float, poisson: float, contrast: float = 1.0, gland: Floats | None = None
+) -> BreastTissue:
     """Homogeneous tissue, or gland `contrast` times as stiff as fat.
 
     Args:
@@ -48,12 +50,12 @@ def neo_hookean_tissue(mu_kpa: float, poisson: float, contrast: float = 1.0, gla
         gland: share of gland in each element (E,), looked at where the contrast is not 1.
     """
     if contrast == 1.0:
-        return Tissue(neo_hookean(mu_kpa, poisson), mu_kpa)
+        return BreastTissue(neo_hookean(mu_kpa, poisson), mu_kpa)
     relative = 1.0 + (contrast - 1.0) * _known(gland)
-    return Tissue(neo_hookean(mu_kpa * relative / float(relative.mean()), poisson), mu_kpa)
+    return BreastTissue(neo_hookean(mu_kpa * relative / float(relative.mean()), poisson), mu_kpa)
 
 
-def catalogue_tissue(name: str, poisson: float, gland: Floats | None, compression: float) -> Tissue:
+def catalogue_tissue(name: str, poisson: float, gland: Floats | None, compression: float) -> BreastTissue:
     """Fat and gland of one of the paper's models, mixed in each element by their shares.
 
     A bulk modulus tied to the initial stiffness would let tissue that stiffens a hundredfold change its volume. So each
@@ -65,14 +67,14 @@ def catalogue_tissue(name: str, poisson: float, gland: Floats | None, compressio
         gland: share of gland in each element (E,).
         compression: share of its thickness that the plates will take from the breast.
     """
-    entry, share = CATALOGUE[name], _known(gland)
+    entry, fraction = CATALOGUE[name], _known(gland)
     laws = (entry.fat.law, entry.gland.law)
-    shares = np.stack([1.0 - share, share], axis=-1)
-    bulk = shares @ np.array([max(tangent_bulk_kpa(law, e, poisson) for e in (0.0, compression)) for law in laws])
-    mixture = TissueMixture(laws, shares)
-    mu = float((shares @ np.array([_stress_mu_kpa(law, compression) for law in laws])).mean())
+    fractions = np.stack([1.0 - fraction, fraction], axis=-1)
+    bulk = fractions @ np.array([max(tangent_bulk_kpa(law, e, poisson) for e in (0.0, compression)) for law in laws])
+    mixture = TissueMixture(laws, fractions)
+    mu = float((fractions @ np.array([_stress_mu_kpa(law, compression) for law in laws])).mean())
     material = hyperelastic(mixture, poisson, bulk)
-    return Tissue(material, mu, float(material.reached_mu_kpa(compression).mean() / material.mu_kpa.mean()))
+    return BreastTissue(material, mu, float(material.reached_mu_kpa(compression).mean() / material.mu_kpa.mean()))
 
 
 def _stress_mu_kpa(law: Law, compression: float) -> float:

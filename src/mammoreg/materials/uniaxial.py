@@ -153,7 +153,7 @@ class UniaxialLaw(ABC):
     def _slope(self, compression: Array) -> Array:
         """W' as a function of the compression."""
         compression = np.maximum(compression, _AT_REST)
-        return np.asarray(self.stress_kpa(compression) / compression * _share(1.0 - compression))
+        return np.asarray(self.stress_kpa(compression) / compression * _strain_ratio(1.0 - compression))
 
     def _curvature(self, compression: Array) -> Array:
         """W'' as a function of the compression: (dW'/de) / (dI1/de)."""
@@ -161,10 +161,10 @@ class UniaxialLaw(ABC):
         stretch = 1.0 - compression
         secant = self.stress_kpa(compression) / compression
         bend = (self.tangent_kpa(compression) - secant) / compression
-        share = _share(stretch)
-        # d share / de, and dI1/de = 2 (l^-2 - l) = e / share
+        ratio = _strain_ratio(stretch)
+        # d ratio / de, and dI1/de = 2 (l^-2 - l) = e / ratio
         rate = -0.5 * stretch * (2.0 + stretch) / (1.0 + stretch + stretch**2) ** 2
-        return np.asarray((bend * share + secant * rate) * share / compression)
+        return np.asarray((bend * ratio + secant * rate) * ratio / compression)
 
     def _shear_tangent(self, compression: Array) -> Array:
         """Slope of the shear stress over the shear whose I1 is that of a compression."""
@@ -195,6 +195,6 @@ def _equivalents(i1: Array) -> tuple[Array, Array]:
     return np.maximum(-stretch_less_one, 0.0), np.sqrt(excess)
 
 
-def _share(stretch: Array) -> Array:
+def _strain_ratio(stretch: Array) -> Array:
     """Ratio e / (2 (l^-2 - l)) without its 0/0 at rest."""
     return np.asarray(0.5 * stretch**2 / (1.0 + stretch + stretch**2))

@@ -32,25 +32,25 @@ def first_mesh(meridians: Meridians, n: int) -> BlockMesh:
     for k in range(m):
         progress = k / n
         angle = _ring_angles(meridians, edge_angles(meridians, axis), border, progress, n)
-        share = 1.0 - progress * (1.0 - _at_angle(border, angle))
-        block[ring[:, 0], ring[:, 1], k] = meridians.at(angle, share)
-    block[:, :, n] = _cap(meridians, angle, share, ring, n)
+        fraction = 1.0 - progress * (1.0 - _at_angle(border, angle))
+        block[ring[:, 0], ring[:, 1], k] = meridians.at(angle, fraction)
+    block[:, :, n] = _cap(meridians, angle, fraction, ring, n)
     block[:, :, 0] = fill_face(block[:, :, 0])
     return BlockMesh(n, fill_block(block).transpose(2, 1, 0, 3).reshape(-1, 3))
 
 
 def curved_axis(meridians: Meridians) -> tuple[Floats, Floats]:
-    """Middles (S, 3) of the rings of equal share, smoothed, and frames (S, 3, 3) with rows medial, superior, front.
+    """Middles (S, 3) of the rings of equal fraction, smoothed, and frames (S, 3, 3) with rows medial, superior, front.
 
     Samples run from the nipple to the rim, as in `Meridians.curves`.
     """
     curves = meridians.curves
     pieces = np.linalg.norm(np.roll(curves, -1, axis=0) - np.roll(curves, 1, axis=0), axis=2) + 1e-6
     middles = np.einsum("ms,msc->sc", pieces, curves) / pieces.sum(axis=0)[:, None]
-    share = np.linspace(0.0, 1.0, middles.shape[0])
-    polynomial = np.polynomial.polynomial.polyfit(share, middles, 3)
-    smooth = np.polynomial.polynomial.polyval(share, polynomial).T
-    front = -np.polynomial.polynomial.polyval(share, np.polynomial.polynomial.polyder(polynomial)).T
+    fraction = np.linspace(0.0, 1.0, middles.shape[0])
+    polynomial = np.polynomial.polynomial.polyfit(fraction, middles, 3)
+    smooth = np.polynomial.polynomial.polyval(fraction, polynomial).T
+    front = -np.polynomial.polynomial.polyval(fraction, np.polynomial.polynomial.polyder(polynomial)).T
     front /= np.linalg.norm(front, axis=1, keepdims=True)
     medial = np.array([1.0, 0.0, 0.0]) - front[:, :1] * front
     medial /= np.linalg.norm(medial, axis=1, keepdims=True)
@@ -58,7 +58,7 @@ def curved_axis(meridians: Meridians) -> tuple[Floats, Floats]:
 
 
 def edge_angles(meridians: Meridians, axis: tuple[Floats, Floats]) -> Floats:
-    """Coefficients (3, 4), quadratic in the share, of the angles of the four long edges, from -135 to 135 degrees."""
+    """Coefficients (3, 4), quadratic in the fraction, of the angles of the long edges, from -135 to 135 degrees."""
     middles, frames = axis
     local = np.einsum("sdc,msc->msd", frames, meridians.curves - middles)[..., :2]
     half = np.ptp(local, axis=0).max(axis=0) / 2.0
@@ -69,12 +69,12 @@ def edge_angles(meridians: Meridians, axis: tuple[Floats, Floats]) -> Floats:
         reach = local[:, samples] @ (direction / np.linalg.norm(direction))
         offset = _wrapped(meridians.angles - nominal)
         found.append(nominal + _soft_argmax(reach, np.where(np.abs(offset) < _EDGE_WINDOW, offset, np.nan)[:, None]))
-    share = samples / (len(middles) - 1)
-    return np.asarray(np.polynomial.polynomial.polyfit(share, np.stack(found, axis=1), 2))
+    fraction = samples / (len(middles) - 1)
+    return np.asarray(np.polynomial.polynomial.polyfit(fraction, np.stack(found, axis=1), 2))
 
 
 def cap_border(meridians: Meridians, axis: tuple[Floats, Floats]) -> Floats:
-    """Fourier coefficients (5,), up to the second order, of the share at which each meridian enters the cap."""
+    """Fourier coefficients (5,), up to the second order, of the fraction at which each meridian enters the cap."""
     middles, frames = axis
     count = len(middles)
     near = count // 3
@@ -83,10 +83,10 @@ def cap_border(meridians: Meridians, axis: tuple[Floats, Floats]) -> Floats:
     outward = np.einsum("msd,md->ms", local[..., :2], radial)
     width, depth = outward.max(), np.ptp(local[..., 2])
     reach = (outward / np.sqrt(width) + local[..., 2] / np.sqrt(depth)) * np.sqrt(0.5 * min(width, depth))
-    share = np.linspace(0.0, 1.0, count)
+    fraction = np.linspace(0.0, 1.0, count)
     mean, deviation = _CAP_PRIOR
-    reach = reach - 0.5 * _SOFTNESS_MM * ((share - mean) / deviation) ** 2
-    found = _soft_argmax(reach.T, share[:, None])
+    reach = reach - 0.5 * _SOFTNESS_MM * ((fraction - mean) / deviation) ** 2
+    found = _soft_argmax(reach.T, fraction[:, None])
     return np.asarray(np.linalg.lstsq(_fourier(meridians.angles), found, rcond=None)[0])
 
 
@@ -125,16 +125,16 @@ def _ring_angles(meridians: Meridians, edges: Floats, border: Floats, progress: 
     angles = []
     for start, end in pairwise(ends):
         fine = np.linspace(start, end, 12 * n + 1)
-        share = 1.0 - progress * (1.0 - _at_angle(border, fine))
-        steps = np.linalg.norm(np.diff(meridians.at(fine, share), axis=0), axis=1)
+        fraction = 1.0 - progress * (1.0 - _at_angle(border, fine))
+        steps = np.linalg.norm(np.diff(meridians.at(fine, fraction), axis=0), axis=1)
         length = np.concatenate([[0.0], np.cumsum(steps)])
         angles.append(np.interp(np.arange(n) / n * length[-1], length, fine))
     return np.concatenate(angles)
 
 
-def _cap(meridians: Meridians, angle: Floats, share: Floats, ring: NDArray[np.int64], n: int) -> Floats:
-    """Nodes (n + 1, n + 1, 3) of the cap, filled in the plane of polar coordinates (share, angle)."""
+def _cap(meridians: Meridians, angle: Floats, fraction: Floats, ring: NDArray[np.int64], n: int) -> Floats:
+    """Nodes (n + 1, n + 1, 3) of the cap, filled in the plane of polar coordinates (fraction, angle)."""
     plane = np.zeros((n + 1, n + 1, 3))
-    plane[ring[:, 0], ring[:, 1], :2] = (share * np.stack([np.cos(angle), np.sin(angle)])).T
+    plane[ring[:, 0], ring[:, 1], :2] = (fraction * np.stack([np.cos(angle), np.sin(angle)])).T
     plane = fill_face(plane)
     return meridians.at(np.arctan2(plane[..., 1], plane[..., 0]), np.hypot(plane[..., 0], plane[..., 1]))

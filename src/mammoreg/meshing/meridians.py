@@ -24,7 +24,7 @@ _WIDEST_GAP = 1.0
 
 @dataclass(frozen=True)
 class Meridians:
-    """The skin as a map from (angle, share of the way from the nipple to the rim).
+    """The skin as a map from (angle, fraction of the way from the nipple to the rim).
 
     Attributes:
         angles: M angles, radians, equally spaced over a full turn from -pi on, in the plane (medial, superior) scaled
@@ -35,11 +35,11 @@ class Meridians:
     angles: Floats
     curves: Floats
 
-    def at(self, angle: Floats, share: Floats) -> Floats:
-        """Points (..., 3) at angles and shares (0 nipple, 1 rim) of one shape, bilinear between the curves."""
+    def at(self, angle: Floats, fraction: Floats) -> Floats:
+        """Points (..., 3) at angles and fractions (0 nipple, 1 rim) of one shape, bilinear between the curves."""
         count, samples = self.curves.shape[:2]
         a = (np.asarray(angle) - self.angles[0]) / (2.0 * np.pi) * count
-        s = np.clip(share, 0.0, 1.0) * (samples - 1)
+        s = np.clip(fraction, 0.0, 1.0) * (samples - 1)
         a0, s0 = np.floor(a).astype(int), np.minimum(np.floor(s).astype(int), samples - 2)
         fa, fs = (a - a0)[..., None], (s - s0)[..., None]
         low, high = a0 % count, (a0 + 1) % count
@@ -64,8 +64,8 @@ def skin_meridians(surface: BreastSurface, nipple: Floats, count: int = 128, sam
     angles = -np.pi + 2.0 * np.pi * np.arange(count) / count
     ends = 0.999 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     # Far from the rim a harmonic map shrinks exponentially: sample densely towards the nipple.
-    share = np.concatenate([[0.0], np.geomspace(0.002, 1.0, 4 * samples)])
-    places = middle + share[None, :, None] * (ends - middle)[:, None, :]
+    fraction = np.concatenate([[0.0], np.geomspace(0.002, 1.0, 4 * samples)])
+    places = middle + fraction[None, :, None] * (ends - middle)[:, None, :]
     traced = lift(places)
     # Between two rim vertices the circle lies outside their chord.
     beyond = np.isnan(traced).any(axis=-1)

@@ -42,5 +42,5 @@ def outline_fit(outline: RadialOutline, model: Silhouette) -> OutlineFit:
 def _weighted(values: np.ndarray, weight: np.ndarray) -> tuple[float, float]:
     """Weighted mean and 95th percentile."""
     order = np.argsort(values)
-    share = np.cumsum(weight[order]) / weight.sum()
-    return float(values @ weight / weight.sum()), float(np.interp(0.95, share, values[order]))
+    cumulated = np.cumsum(weight[order]) / weight.sum()
+    return float(values @ weight / weight.sum()), float(np.interp(0.95, cumulated, values[order]))

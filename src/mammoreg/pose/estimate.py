@@ -35,7 +35,7 @@ class Compressed:
 
 
 @dataclass(frozen=True)
-class Tissue:
+class DenseTissue:
     """Tissue points tied to the coarse mesh, with the attenuation that they have over fat.
 
     Attributes:
@@ -89,7 +89,7 @@ def estimate_pose(
     step_deg: float,
     bound_deg: float,
     prior_sd_deg: float,
-    tissue: Tissue | None = None,
+    tissue: DenseTissue | None = None,
     mammogram: DensityImage | None = None,
 ) -> PoseEstimate | None:
     """Estimate the pose around a start (header's angle, edge and middle of the scaled breast).
@@ -164,7 +164,7 @@ def _misfit(rms_mm: float, ncc: float, patches: float, offset: float) -> float:
 
 
 def _density(
-    nodes: Points, view: ViewGeometry, tissue: Tissue | None, mammogram: DensityImage | None
+    nodes: Points, view: ViewGeometry, tissue: DenseTissue | None, mammogram: DensityImage | None
 ) -> tuple[float, float]:
     """Correlation of dense tissue and the number of independent patches that carry it."""
     if tissue is None or mammogram is None:

@@ -14,7 +14,7 @@ from mammoreg.projection.deformed import MeshInverse, PlateGrid, grid_around, re
 
 
 @dataclass(frozen=True)
-class Tissue:
+class ImagedTissue:
     """The undeformed breast in the breast frame, on one grid.
 
     Attributes:
@@ -43,11 +43,11 @@ class DeformedBreast:
         return self.grid.volume(resample(source, self.origins))
 
 
-def tissue_of_labels(labels: Volume, breast_mask: Volume) -> Tissue:
+def tissue_of_labels(labels: Volume, breast_mask: Volume) -> ImagedTissue:
     """Attenuation and mask of the breast from its label map (0 to 4) and mask, volumes on one grid."""
     inside = np.asarray(breast_mask.data) != 0
     attenuation = np.where(inside, attenuation_map(np.asarray(labels.data)), np.float32(0.0))
-    return Tissue(labels.with_data(attenuation), breast_mask.with_data(inside.astype(np.float32)))
+    return ImagedTissue(labels.with_data(attenuation), breast_mask.with_data(inside.astype(np.float32)))
 
 
 def deformed_nodes(method: MethodView, nodes: Points) -> Points:
@@ -76,7 +76,7 @@ def deform_breast(method: MethodView, nodes: Points, spacing_mm: float) -> Defor
 
 
 def project_breast(
-    breast: DeformedBreast, tissue: Tissue, method: MethodView, step: int
+    breast: DeformedBreast, tissue: ImagedTissue, method: MethodView, step: int
 ) -> tuple[Image, NDArray[np.bool_]]:
     """Projected attenuation and silhouette of a deformed breast, at the middles of blocks of `step` pixels."""
     image = project_volume(breast.carry(tissue.attenuation), method.geometry, step)

@@ -18,7 +18,7 @@ def interpolate_axis(samples: NDArray[Any], index: NDArray[np.float64], axis: in
     shape = [1] * samples.ndim
     shape[axis] = len(index)
     held = ((index > -0.5) & (index < size - 0.5)).astype(np.float32)
-    share = (clipped - low).astype(np.float32).reshape(shape)
+    weight = (clipped - low).astype(np.float32).reshape(shape)
     held = held.reshape(shape)
     first, second = samples.take(low, axis=axis), samples.take(high, axis=axis)
-    return np.asarray(first * (held * (1.0 - share)) + second * (held * share), dtype=np.float32)
+    return np.asarray(first * (held * (1.0 - weight)) + second * (held * weight), dtype=np.float32)

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from mammoreg.meshing.trilinear import CORNERS, GAUSS_POINTS, jacobians, shape_gradients
 from mammoreg.scenes.gland import Floats
-from mammoreg.scenes.tissue import Tissue
+from mammoreg.scenes.tissue import SceneTissue
 
 _STEP = 1e-5
 """Of the central differences, as a share of an element's size."""
@@ -20,7 +20,7 @@ class InnerForces:
         tissue: energy and bulk modulus of each element.
     """
 
-    def __init__(self, points: Floats, hexes: NDArray[np.integer], tissue: Tissue) -> None:
+    def __init__(self, points: Floats, hexes: NDArray[np.integer], tissue: SceneTissue) -> None:
         self.hexes, self.tissue = hexes, tissue
         reference = jacobians(points[hexes], GAUSS_POINTS)
         inverse = np.linalg.inv(reference)

@@ -11,7 +11,7 @@ from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.scenes.gland import Floats, gland_share
 from mammoreg.scenes.scenario import Scenario
-from mammoreg.scenes.tissue import FAT_KPA, Tissue, scene_tissue
+from mammoreg.scenes.tissue import FAT_KPA, SceneTissue, scene_tissue
 
 EDGE_MM = 8.0
 """The plates end this far in front of the back's mean place, and behind none of its nodes: these are held and cannot
@@ -44,7 +44,7 @@ class Scene:
     points: Floats
     hexes: NDArray[np.int64]
     skin_quads: NDArray[np.int64]
-    tissue: Tissue
+    tissue: SceneTissue
     back: BackCondition
     edge_p_mm: float
     closing: Closing
@@ -80,5 +80,5 @@ def contact_options(mean_kpa: float) -> ClosingOptions:
     """
     plain = ClosingOptions()
     most = STIFFEST_PER_MM * FAT_KPA / (plain.penalty_per_mm * mean_kpa)
-    factors = tuple(f for f in FACTORS if f <= max(most, plain.stiffening[-1]))
-    return replace(plain, tolerance_mm=TOLERANCE_MM, rests=RESTS, stiffening=factors)
+    factors = tuple(f for f in FACTORS if f <= max(most, plain.contact_factors[-1]))
+    return replace(plain, tolerance_mm=TOLERANCE_MM, rests=RESTS, contact_factors=factors)

@@ -27,7 +27,7 @@ Law = NeoHookean | Exponential | Linear
 
 
 @dataclass(frozen=True)
-class Tissue:
+class SceneTissue:
     """Strain energy of the elements, for the solver and, by itself, for the checks from outside.
 
     Attributes:
@@ -54,7 +54,7 @@ class Tissue:
         return energy
 
 
-def scene_tissue(material: str, poisson: float, contrast: float, compression: float, gland: Floats) -> Tissue:
+def scene_tissue(material: str, poisson: float, contrast: float, compression: float, gland: Floats) -> SceneTissue:
     """Tissue of a scenario.
 
     K follows from Poisson's ratio and the initial shear modulus; that of the exponential law, whose stiffness grows
@@ -73,9 +73,9 @@ def scene_tissue(material: str, poisson: float, contrast: float, compression: fl
     mu = mixture.mu_kpa
     bulk = np.maximum(FAT_KPA * bulk_ratio(poisson), reached) * mu / FAT_KPA
     if not material.endswith("fibres"):
-        return Tissue(mixture, bulk, None)
+        return SceneTissue(mixture, bulk, None)
     stiffening = STIFFENING if material == "stiffening_fibres" else 0.0
-    return Tissue(mixture, bulk, Fibres(NIPPLE_AXIS, FIBRE_RATIO * mu, stiffening).of_elements(len(mu)))
+    return SceneTissue(mixture, bulk, Fibres(NIPPLE_AXIS, FIBRE_RATIO * mu, stiffening).of_elements(len(mu)))
 
 
 def _law(material: str, contrast: float) -> Law:

@@ -43,9 +43,9 @@ def outline_ties(
     """
     state = measure(facets.positions(nodes), facets.quads, view, outline, facets.rim)
     used = np.flatnonzero((state.weight > 0) & (state.model.edge_nodes[:, 0] >= 0))
-    edge, share = state.model.edge_nodes[used], state.model.edge_weight[used]
-    rows = facets.interpolation[edge[:, 0]].multiply((1.0 - share)[:, None]).tocsr()
-    rows = rows + facets.interpolation[edge[:, 1]].multiply(share[:, None]).tocsr()
+    edge, weight = state.model.edge_nodes[used], state.model.edge_weight[used]
+    rows = facets.interpolation[edge[:, 0]].multiply((1.0 - weight)[:, None]).tocsr()
+    rows = rows + facets.interpolation[edge[:, 1]].multiply(weight[:, None]).tocsr()
     per_face = facets.interpolation.shape[0] // len(faces)
     corners = np.asarray(faces, dtype=np.int64)[edge[:, 0] // per_face]
     shape = np.stack([np.asarray(rows[np.arange(len(used)), corners[:, c]]).ravel() for c in range(4)], axis=-1)

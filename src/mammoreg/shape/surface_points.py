@@ -13,7 +13,7 @@ _FACETS = 8
 def nearest_on_skin(
     nodes: Points, faces: NDArray[np.integer], points: Points
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Corners (P, 4) and shares (P, 4) of the skin's points nearest to points (P, 3), to an eighth of a face.
+    """Corners (P, 4) and weights (P, 4) of the skin's points nearest to points (P, 3), to an eighth of a face.
 
     Args:
         nodes: of the mesh (N, 3), mm, in the frame of the points.
@@ -25,5 +25,5 @@ def nearest_on_skin(
     per_face = facets.interpolation.shape[0] // len(faces)
     corners = np.asarray(faces, dtype=np.int64)[found // per_face]
     rows = facets.interpolation[found]
-    shares = np.stack([np.asarray(rows[np.arange(len(points)), corners[:, c]]).ravel() for c in range(4)], axis=-1)
-    return corners, shares
+    weights = np.stack([np.asarray(rows[np.arange(len(points)), corners[:, c]]).ravel() for c in range(4)], axis=-1)
+    return corners, weights

@@ -2,7 +2,7 @@
 
 from pydantic import Field
 
-from mammoreg.materials.catalogue import CATALOGUE, Tissue
+from mammoreg.materials.catalogue import CATALOGUE, CatalogueTissue
 from mammoreg.materials.cube import HIGH_COMPRESSION, LOW_COMPRESSION, SULLIVAN, cube_force_n, mu_for_force_kpa
 from mammoreg.materials.laws import NeoHookean
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
@@ -53,7 +53,7 @@ def _rows(model: str) -> list[dict[str, Value]]:
     ]
 
 
-def _row(model: str, name: str, tissue: Tissue, compression: float, paper_n: float | None) -> dict[str, Value]:
+def _row(model: str, name: str, tissue: CatalogueTissue, compression: float, paper_n: float | None) -> dict[str, Value]:
     force = cube_force_n(tissue.law, compression)
     return {
         "model": model,

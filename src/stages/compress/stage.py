@@ -53,7 +53,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         ClosingOptions(),
         steps=settings.load_steps,
         tolerance_mm=settings.tolerance_mm,
-        penalty_per_mm=settings.penalty_per_mm * breast.stiffening,
+        penalty_per_mm=settings.penalty_per_mm * breast.stiffness_ratio,
     )
     closing = closing_plates(breast, view.edge_p_mm, mechanics, options, lower_mm)
     by_force = settings.stop == "force"
@@ -76,7 +76,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             "raised_mm": closed.state.height,
             "uncompressed_mm": closing.uncompressed_mm,
             "compression": compression,
-            "stiffening": breast.stiffening,
+            "stiffness_ratio": breast.stiffness_ratio,
             **kept_values(settings.mechanics, options, mu_kpa, view.angle_deg),
         },
     )

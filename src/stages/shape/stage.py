@@ -49,7 +49,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         facets,
         floating,
         outline,
-        settings.tie_stiffness * float(compress.value("stiffening")),
+        settings.tie_stiffness * float(compress.value("stiffness_ratio")),
         settings.rounds,
         settings.settled_mm,
     )

@@ -112,9 +112,9 @@ def interpolate_elements(values: NDArray[Number], fine: int, coarse: int) -> NDA
 def _line(fine: int, coarse: int) -> sp.csr_array:
     place = np.arange(fine + 1) * coarse / fine
     cell = np.minimum(place.astype(np.int64), coarse - 1)
-    share = np.concatenate([1.0 - (place - cell), place - cell])
+    weight = np.concatenate([1.0 - (place - cell), place - cell])
     row = np.tile(np.arange(fine + 1), 2)
-    line = sp.csr_array((share, (row, np.concatenate([cell, cell + 1]))), shape=(fine + 1, coarse + 1))
+    line = sp.csr_array((weight, (row, np.concatenate([cell, cell + 1]))), shape=(fine + 1, coarse + 1))
     line.eliminate_zeros()
     return line
 

@@ -77,10 +77,10 @@ def _cycle(
             break
         basis.append(product / below)
     count = len(corrections)
-    shares = np.linalg.solve(triangle[:count, :count], turned[:count])
+    weights = np.linalg.solve(triangle[:count, :count], turned[:count])
     change = np.zeros_like(residual)
-    for share, correction in zip(shares, corrections, strict=True):
-        change += share * correction
+    for weight, correction in zip(weights, corrections, strict=True):
+        change += weight * correction
     return change, count, abs(float(turned[count]))
 
 

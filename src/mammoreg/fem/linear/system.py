@@ -117,16 +117,16 @@ class NewtonSystem:
         """Share of an update, 1 halved as often as needed, that keeps det F above `least` of its smallest value.
 
         Raises:
-            NotConvergedError: even a small share turns an element inside out.
+            NotConvergedError: even a short step turns an element inside out.
         """
         motion = update[: positions.size].reshape(-1, 3)
         bound = least * self.model.determinants(positions).min()
-        share = 1.0
-        while self.model.determinants(positions + share * motion).min() <= bound:
-            share *= 0.5
-            if share < SHORTEST_UPDATE:
+        step_length = 1.0
+        while self.model.determinants(positions + step_length * motion).min() <= bound:
+            step_length *= 0.5
+            if step_length < SHORTEST_UPDATE:
                 raise NotConvergedError("an element turns inside out")
-        return share
+        return step_length
 
 
 def node_dofs(nodes: Integers) -> Integers:

@@ -44,9 +44,9 @@ class Gravity:
         """Itself."""
         return self
 
-    def at(self, share: float) -> "Gravity":
-        """A share of the load."""
-        return replace(self, force=share * self.force)
+    def at(self, load_factor: float) -> "Gravity":
+        """The load at a load factor."""
+        return replace(self, force=load_factor * self.force)
 
 
 def gravity(model: HyperelasticModel, density_kg_m3: float | Array, direction: NDArray[np.floating]) -> Gravity:

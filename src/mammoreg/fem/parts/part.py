@@ -33,16 +33,16 @@ class Part(Protocol):
 class GradualPart(Part, Protocol):
     """A part that is brought on with the load steps."""
 
-    def at(self, share: float, /) -> "Part":
-        """The part at a share of its load, 1 in the end; same `dofs`."""
+    def at(self, load_factor: float, /) -> "Part":
+        """The part at a load factor, 1 in the end; same `dofs`."""
 
 
 Parts = tuple[Part, ...]
 
 
-def parts_at(parts: Sequence[Part], share: float) -> Parts:
-    """Parts at a share of the load; those that are not gradual act wholly."""
-    return tuple(part.at(share) if isinstance(part, GradualPart) else part for part in parts)
+def parts_at(parts: Sequence[Part], load_factor: float) -> Parts:
+    """Parts at a load factor; those that are not gradual act wholly."""
+    return tuple(part.at(load_factor) if isinstance(part, GradualPart) else part for part in parts)
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,9 @@ class BackSprings:
         """Itself."""
         return self
 
-    def at(self, share: float) -> "BackSprings":
-        """The springs at a share of the pull."""
-        return replace(self, pull_mm=share * self.pull_mm)
+    def at(self, load_factor: float) -> "BackSprings":
+        """The springs at a load factor of the pull."""
+        return replace(self, pull_mm=load_factor * self.pull_mm)
 
     def _stretch(self, positions: Array) -> Array:
         return np.asarray(positions[self.nodes] - (self.rest + self.pull_mm))

@@ -15,7 +15,7 @@ class PlaneTies:
 
     Attributes:
         nodes: corners (T, 4) of the face that carries each point.
-        shape: shares (T, 4) of the corners at the point.
+        shape: weights (T, 4) of the corners at the point.
         direction: unit normals (T, 3) of the planes.
         offset: places (T,) of the planes along their normals, mm.
         stiffness: spring constants (T,), mN/mm.

@@ -15,7 +15,7 @@ class PointTies:
 
     Attributes:
         nodes: corners (T, 4) of the face that carries each point.
-        shape: shares (T, 4) of the corners at the point.
+        shape: weights (T, 4) of the corners at the point.
         rest: places (T, 3) of the undeformed points, mm.
         target: where they are drawn to (T, 3), mm.
         stiffness: spring constants (T,), mN/mm.
@@ -40,8 +40,8 @@ class PointTies:
         """Residual (T, 12), mN, and stiffness (T, 12, 12), mN/mm."""
         pull = self.stiffness[:, None] * (self.points(positions) - self.target)
         force = self.shape[:, :, None] * pull[:, None, :]
-        share = self.stiffness[:, None, None] * self.shape[:, :, None] * self.shape[:, None, :]
-        blocks = share[:, :, None, :, None] * np.eye(3)[None, None, :, None, :]
+        stiffness = self.stiffness[:, None, None] * self.shape[:, :, None] * self.shape[:, None, :]
+        blocks = stiffness[:, :, None, :, None] * np.eye(3)[None, None, :, None, :]
         return force.reshape(-1, 12), blocks.reshape(-1, 12, 12)
 
     def energy_mj(self, positions: Array) -> float:
@@ -52,29 +52,29 @@ class PointTies:
         """Itself."""
         return self
 
-    def at(self, share: float) -> "PointTies":
-        """Springs towards places that have come a share of their way."""
-        return replace(self, target=self.rest + share * (self.target - self.rest))
+    def at(self, load_factor: float) -> "PointTies":
+        """Springs towards places that have come as far as the load factor says."""
+        return replace(self, target=self.rest + load_factor * (self.target - self.rest))
 
 
 def point_ties(
-    points: Array, corners: NDArray[np.integer], shares: Array, targets: Array, stiffness: float | Array
+    points: Array, corners: NDArray[np.integer], weights: Array, targets: Array, stiffness: float | Array
 ) -> PointTies:
     """Ties of points given by the faces that carry them.
 
     Args:
         points: undeformed nodes (N, 3), mm.
         corners: of the face of each point (T, 4).
-        shares: of the corners at the point (T, 4), from 0 to 1, 1 together.
+        weights: of the corners at the point (T, 4), from 0 to 1, 1 together.
         targets: where the points are drawn to (T, 3), mm.
         stiffness: spring constants, scalar or (T,), mN/mm.
 
     Raises:
         ValueError: a point is not on its face, or a spring is not stiff.
     """
-    shape, nodes = np.asarray(shares, dtype=float), np.asarray(corners, dtype=np.int64)
+    shape, nodes = np.asarray(weights, dtype=float), np.asarray(corners, dtype=np.int64)
     if np.any(shape < -1e-9) or not np.allclose(shape.sum(axis=1), 1.0):
-        raise ValueError("points of ties must lie on their faces: shares from 0 to 1 that add up to 1")
+        raise ValueError("points of ties must lie on their faces: weights from 0 to 1 that add up to 1")
     spring = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(shape),)).copy()
     if not np.all(spring > 0.0):
         raise ValueError("springs of ties must have a positive stiffness")

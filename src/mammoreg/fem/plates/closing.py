@@ -18,7 +18,7 @@ from mammoreg.fem.parts.part import Part, all_nodes
 from mammoreg.fem.plates.equilibrium import DampedEquilibrium
 from mammoreg.fem.plates.options import COARSE, ClosingOptions
 from mammoreg.fem.plates.predictor import affine_predictor
-from mammoreg.fem.plates.relaxation import STIFF_DAMPING, Resting
+from mammoreg.fem.plates.relaxation import STIFF_DAMPING, Relaxation
 from mammoreg.fem.plates.result import Closed
 from mammoreg.fem.plates.state import DampedState, Load
 
@@ -27,7 +27,7 @@ __all__ = ["COARSE", "Closed", "Closing", "ClosingOptions", "Moving"]
 Moving = Literal["both", "upper", "lower"]
 
 LEAST_GUESS_DET = 0.2  # an affine guess that squeezes an element further is not used
-LARGEST_STEP = 0.5  # of the way, after easy steps
+LARGEST_STEP = 0.5  # of the load factor, after easy steps
 NOMINAL, DEEPEST = 0.5, 0.85  # compression that the load steps of a closing to a force share, and the last one tried
 LOADED = 0.2  # compression at which gradual loads are wholly on in a closing to a force
 FORCE_TOLERANCE = 0.005
@@ -36,8 +36,8 @@ LARGEST_CORRECTION = 0.2  # of the gap, in the search for a force
 
 
 @dataclass(frozen=True)
-class Way:
-    """How far plates have come: the state there, their gap, load steps taken and failed."""
+class LoadStep:
+    """Where a load step has ended: the state and the plates' gap there, load steps taken and failed so far."""
 
     state: DampedState
     gap_mm: float
@@ -99,11 +99,11 @@ class Closing:
         """Height of the part between the plates before compression: the gap at which both touch."""
         return self.high - self.low
 
-    def plates(self, gap_mm: float, share: float = 1.0) -> tuple[Plate, Plate]:
-        """Plates at a share of their way: around the middle of first touch, or on the way to their known height."""
+    def plates(self, gap_mm: float, load_factor: float = 1.0) -> tuple[Plate, Plate]:
+        """Plates at a load factor: around the middle of first touch, or on the way to their known height."""
         middle = 0.5 * (self.low + self.high)
         if self.lower_mm is not None:
-            middle += share * (self.lower_mm + 0.5 * gap_mm - middle)
+            middle += load_factor * (self.lower_mm + 0.5 * gap_mm - middle)
         elif self.moving == "upper":
             middle = self.low + 0.5 * gap_mm
         elif self.moving == "lower":
@@ -133,8 +133,8 @@ class Closing:
                 f"the plates' gap of {gap_mm:.1f} mm does not compress a breast of {self.uncompressed_mm:.1f} mm"
             )
         equilibrium = self.equilibrium()
-        way = self._march(equilibrium, gap_mm, 1.0 / self.options.steps)[-1]
-        return self._resting(equilibrium, gap_mm, way).settled(way.state, self.options.damping)
+        reached = self._march(equilibrium, gap_mm, 1.0 / self.options.steps)[-1]
+        return self._relaxation(equilibrium, gap_mm, reached).settled(reached.state, self.options.damping)
 
     def close_to_force(self, force_n: float) -> Closed:
         """Close the plates until the mean of their forces is `force_n`, within half a percent; `gap_mm` says where.
@@ -148,16 +148,16 @@ class Closing:
         equilibrium = self.equilibrium()
         deepest = (1.0 - DEEPEST) * self.uncompressed_mm
 
-        def enough(way: Way) -> bool:
-            return self._force_n(equilibrium, way) >= force_n
+        def enough(reached: LoadStep) -> bool:
+            return self._force_n(equilibrium, reached) >= force_n
 
-        ways = self._march(equilibrium, deepest, NOMINAL / DEEPEST / self.options.steps, LOADED / DEEPEST, enough)
-        if not enough(ways[-1]):
+        path = self._march(equilibrium, deepest, NOMINAL / DEEPEST / self.options.steps, LOADED / DEEPEST, enough)
+        if not enough(path[-1]):
             raise NotConvergedError(
                 f"a force of {force_n:.1f} N is not reached: at a gap of {deepest:.1f} mm the plates press with "
-                f"{self._force_n(equilibrium, ways[-1]):.1f} N"
+                f"{self._force_n(equilibrium, path[-1]):.1f} N"
             )
-        return self._sought(equilibrium, ways, force_n)
+        return self._sought(equilibrium, path, force_n)
 
     def resume(self, state: DampedState, gap_mm: float) -> Closed:
         """Come to rest at a gap from a state near the answer, such as that of a coarser mesh.
@@ -165,9 +165,9 @@ class Closing:
         Raises:
             NotConvergedError: with the reason.
         """
-        resting = self._resting(self.equilibrium(), gap_mm, Way(state, gap_mm, 1))
-        eased = resting.eased(resting.stiff, state, self.options.damping)
-        return resting.rested(eased, STIFF_DAMPING * self.options.damping)
+        relaxation = self._relaxation(self.equilibrium(), gap_mm, LoadStep(state, gap_mm, 1))
+        eased = relaxation.eased(relaxation.stiff, state, self.options.damping)
+        return relaxation.rested(eased, STIFF_DAMPING * self.options.damping)
 
     def further(self, closed: Closed, gap_mm: float) -> Closed:
         """Go on from a closed state, which was not tied to an outline, to a narrower gap in one step.
@@ -175,8 +175,8 @@ class Closing:
         Raises:
             NotConvergedError: with the reason.
         """
-        way = Way(closed.state, closed.gap_mm, closed.steps, closed.cuts)
-        return self._closed_further(self.equilibrium(), way, gap_mm, soft=False)
+        reached = LoadStep(closed.state, closed.gap_mm, closed.steps, closed.cuts)
+        return self._closed_further(self.equilibrium(), reached, gap_mm, soft=False)
 
     def rest(self, closed: Closed, outline: Part, damping: float) -> Closed:
         """Go on from a closed state with an outline drawing on the skin.
@@ -186,16 +186,16 @@ class Closing:
         """
         lagged = self.parts if closed.state.parts is None else closed.state.parts[: len(self.parts)]
         state = replace(closed.state, parts=(*lagged, outline))
-        way = Way(state, closed.gap_mm, closed.steps, closed.cuts)
-        resting = self._resting(self.equilibrium(outline), closed.gap_mm, way)
+        reached = LoadStep(state, closed.gap_mm, closed.steps, closed.cuts)
+        relaxation = self._relaxation(self.equilibrium(outline), closed.gap_mm, reached)
         # Easing the contact first would unload the friction that the closing has built up.
         try:
-            return resting.rested(state, damping)
+            return relaxation.rested(state, damping)
         except NotConvergedError:
-            return resting.settled(state, damping)
+            return relaxation.settled(state, damping)
 
-    def _resting(self, equilibrium: DampedEquilibrium, gap_mm: float, way: Way) -> Resting:
-        return Resting(equilibrium, self.options, Load(self.plates(gap_mm)), gap_mm, way.steps, way.cuts)
+    def _relaxation(self, equilibrium: DampedEquilibrium, gap_mm: float, reached: LoadStep) -> Relaxation:
+        return Relaxation(equilibrium, self.options, Load(self.plates(gap_mm)), gap_mm, reached.steps, reached.cuts)
 
     def _march(
         self,
@@ -203,15 +203,15 @@ class Closing:
         gap_mm: float,
         first: float,
         loaded: float = 1.0,
-        enough: Callable[[Way], bool] = lambda _: False,
-    ) -> list[Way]:
+        enough: Callable[[LoadStep], bool] = lambda _: False,
+    ) -> list[LoadStep]:
         """Load steps from first touch to a gap, or until it is enough.
 
         Args:
             equilibrium: the equations.
             gap_mm: end of the way.
-            first: share of the way in a step; less where one fails, more after easy ones.
-            loaded: share of the way at which gradual loads are wholly on.
+            first: increment of the load factor in a step; less where one fails, more after easy ones.
+            loaded: load factor at which gradual loads are wholly on.
             enough: whether to stop.
 
         Raises:
@@ -219,68 +219,70 @@ class Closing:
         """
         start = self.contact.start(self.points, self.plates(self.uncompressed_mm, 0.0), 0.0)
         state = DampedState(self.points, np.zeros(len(self.model.hexes)), 0.0, start)
-        ways, done, step, cuts = [Way(state, self.uncompressed_mm)], 0.0, first, 0
-        while done < 1.0 and not enough(ways[-1]):
-            share = min(1.0, done + step)
-            share = 1.0 if share > 1.0 - 1e-9 else share
-            gap = self.uncompressed_mm + (gap_mm - self.uncompressed_mm) * share
+        path, done, increment, cuts = [LoadStep(state, self.uncompressed_mm)], 0.0, first, 0
+        while done < 1.0 and not enough(path[-1]):
+            load_factor = min(1.0, done + increment)
+            load_factor = 1.0 if load_factor > 1.0 - 1e-9 else load_factor
+            gap = self.uncompressed_mm + (gap_mm - self.uncompressed_mm) * load_factor
             before = len(equilibrium.residuals)
             try:
-                state = self._advance(equilibrium, ways[-1], gap, min(1.0, share / loaded))
+                state = self._advance(equilibrium, path[-1], gap, min(1.0, load_factor / loaded))
             except NotConvergedError as error:
-                cuts, step = cuts + 1, 0.5 * step
-                if step < self.options.least_step:
-                    came = f"the plates came to {ways[-1].gap_mm:.1f} of {gap_mm:.1f} mm"
+                cuts, increment = cuts + 1, 0.5 * increment
+                if increment < self.options.least_step:
+                    came = f"the plates came to {path[-1].gap_mm:.1f} of {gap_mm:.1f} mm"
                     raise NotConvergedError(f"{error}; {came}") from error
                 continue
-            done = share
-            ways.append(Way(state, gap, ways[-1].steps + 1, cuts))
+            done = load_factor
+            path.append(LoadStep(state, gap, path[-1].steps + 1, cuts))
             easy = len(equilibrium.residuals) - before <= self.options.easy_iterations
-            step = min(2.0 * step, LARGEST_STEP) if easy else min(1.5 * step, max(step, first))
-        return ways
+            increment = min(2.0 * increment, LARGEST_STEP) if easy else min(1.5 * increment, max(increment, first))
+        return path
 
-    def _advance(self, equilibrium: DampedEquilibrium, way: Way, gap: float, share: float) -> DampedState:
-        load, state = Load(self.plates(gap, share), share), way.state
-        guess = self.predictor.predict(state.positions, state.height, load.plates, gap / way.gap_mm)
+    def _advance(
+        self, equilibrium: DampedEquilibrium, reached: LoadStep, gap: float, load_factor: float
+    ) -> DampedState:
+        load, state = Load(self.plates(gap, load_factor), load_factor), reached.state
+        guess = self.predictor.predict(state.positions, state.height, load.plates, gap / reached.gap_mm)
         if self.model.determinants(guess).min() < LEAST_GUESS_DET:
             guess = state.positions
-        held, anchors = equilibrium.held, equilibrium.anchors(share)
+        held, anchors = equilibrium.held, equilibrium.anchors(load_factor)
         positions = np.where(held, anchors, guess)
         if self.model.determinants(positions).min() <= 0.0:
             positions = np.where(held, anchors, state.positions)
         start = replace(state, positions=positions)
         return equilibrium.step(start, load, self.options.damping, self.options.tolerance_mm)
 
-    def _force_n(self, equilibrium: DampedEquilibrium, way: Way) -> float:
+    def _force_n(self, equilibrium: DampedEquilibrium, reached: LoadStep) -> float:
         """Mean size of the plates' forces along the compression."""
-        forces = equilibrium.terms(way.state, self.plates(way.gap_mm)).plate_force
+        forces = equilibrium.terms(reached.state, self.plates(reached.gap_mm)).plate_force
         return 1e-3 * float(np.abs(forces[:, 2]).mean())
 
-    def _sought(self, equilibrium: DampedEquilibrium, ways: list[Way], force_n: float) -> Closed:
+    def _sought(self, equilibrium: DampedEquilibrium, path: list[LoadStep], force_n: float) -> Closed:
         """Rest at the gap whose force is wanted: a secant on its logarithm from the last two load steps on."""
-        loads = [np.log(max(self._force_n(equilibrium, way), 1e-3 * force_n)) for way in ways[-2:]]
-        rate = (loads[1] - loads[0]) / (ways[-1].gap_mm - ways[-2].gap_mm)
-        way, wanted, closed = ways[-2], float(np.log(force_n)), None
-        gap = float(np.clip(way.gap_mm + (wanted - loads[0]) / rate, ways[-1].gap_mm, way.gap_mm))
+        loads = [np.log(max(self._force_n(equilibrium, reached), 1e-3 * force_n)) for reached in path[-2:]]
+        rate = (loads[1] - loads[0]) / (path[-1].gap_mm - path[-2].gap_mm)
+        reached, wanted, closed = path[-2], float(np.log(force_n)), None
+        gap = float(np.clip(reached.gap_mm + (wanted - loads[0]) / rate, path[-1].gap_mm, reached.gap_mm))
         for _ in range(FORCE_ROUNDS):
-            before, last = closed, way.gap_mm
-            closed = self._closed_further(equilibrium, way, gap, soft=closed is None)
+            before, last = closed, reached.gap_mm
+            closed = self._closed_further(equilibrium, reached, gap, soft=closed is None)
             load = _log_force(closed)
             if abs(np.expm1(load - wanted)) < FORCE_TOLERANCE:
                 return closed
             if before is not None and gap != last:
                 rate = (load - _log_force(before)) / (gap - last)
-            way = Way(closed.state, gap, closed.steps, closed.cuts)
+            reached = LoadStep(closed.state, gap, closed.steps, closed.cuts)
             gap += float(np.clip((wanted - load) / rate, -LARGEST_CORRECTION * gap, LARGEST_CORRECTION * gap))
         raise NotConvergedError(f"no gap found at which the plates press with {force_n:.1f} N; last {gap:.1f} mm")
 
-    def _closed_further(self, equilibrium: DampedEquilibrium, way: Way, gap: float, *, soft: bool) -> Closed:
+    def _closed_further(self, equilibrium: DampedEquilibrium, reached: LoadStep, gap: float, *, soft: bool) -> Closed:
         """Rest at a gap from one near it: of a load step in the soft contact, or of a body at rest."""
-        resting = self._resting(equilibrium, gap, way)
+        relaxation = self._relaxation(equilibrium, gap, reached)
         if soft:
-            return resting.settled(self._advance(equilibrium, way, gap, 1.0), self.options.damping)
-        stiff = self._advance(resting.stiff, way, gap, 1.0)
-        return resting.rested(stiff, STIFF_DAMPING * self.options.damping)
+            return relaxation.settled(self._advance(equilibrium, reached, gap, 1.0), self.options.damping)
+        stiff = self._advance(relaxation.stiff, reached, gap, 1.0)
+        return relaxation.rested(stiff, STIFF_DAMPING * self.options.damping)
 
 
 def _log_force(closed: Closed) -> float:

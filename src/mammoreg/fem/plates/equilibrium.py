@@ -72,10 +72,10 @@ class DampedEquilibrium:
         other.contact = contact
         return other
 
-    def anchors(self, share: float) -> Array:
-        """Where held components (N, 3) stand at a share of the pull."""
+    def anchors(self, load_factor: float) -> Array:
+        """Where held components (N, 3) stand at a load factor of the pull."""
         anchors = self.points.copy()
-        anchors[self.back.nodes] += share * self.back.pull_mm
+        anchors[self.back.nodes] += load_factor * self.back.pull_mm
         return anchors
 
     def _prepare(self, parts: Parts) -> None:
@@ -103,8 +103,8 @@ class DampedEquilibrium:
         mu = float(np.average(self.model.material.mu_kpa, weights=self.model.volume))
         size = float(np.mean(self.model.volume)) ** (1.0 / 3.0)
         body, extra = self.points[: len(volume)], self.points[len(volume) :]
-        share = np.append(volume, volume[cKDTree(body).query(extra)[1]])
-        return np.asarray(np.append(np.repeat(share, 3), volume.sum()) * mu / size**2)
+        lumped = np.append(volume, volume[cKDTree(body).query(extra)[1]])
+        return np.asarray(np.append(np.repeat(lumped, 3), volume.sum()) * mu / size**2)
 
     def step(self, start: DampedState, load: Load, damping: float, tolerance_mm: float) -> DampedState:
         """One implicit step, damped towards its start.
@@ -144,7 +144,7 @@ class DampedEquilibrium:
     def _step(self, start: DampedState, load: Load, damping: float) -> DampedStep:
         lagged = self.parts if start.parts is None else start.parts
         self._fit(lagged)
-        return DampedStep(self, start, load, parts_at((*self.springs, *lagged), load.share), damping)
+        return DampedStep(self, start, load, parts_at((*self.springs, *lagged), load.factor), damping)
 
     def penetration_mm(self, state: DampedState, plates: Sequence[Plate]) -> float:
         """How deep skin lies in a plate that could give way: faces whose height is held somewhere are left out."""

@@ -13,7 +13,7 @@ from mammoreg.fem.linear.hierarchy import Array, Hierarchy, Integers, block_size
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.fem.plates.state import DampedState
-from mammoreg.fem.plates.untangle import unfolded
+from mammoreg.fem.plates.untangle import untangled
 from mammoreg.materials.elastic import ElasticMaterial
 from mammoreg.meshing.block import BlockMesh
 
@@ -21,7 +21,7 @@ COARSEST = 8  # elements a side up to which a mesh is closed on its own
 NEAREST_POINTS = 4
 LEAST_START_DET = 0.02  # an interpolated start that squeezes an element further is not used
 HEALED_DET = 0.1  # what interpolation squeezes further is healed
-WIDER_SHARE = 0.6  # of the plates' way, to start from instead
+WIDER_FACTOR = 0.6  # load factor, to start from instead
 
 _log = logging.getLogger(__name__)
 
@@ -98,7 +98,7 @@ def _resumed(coarse: Closing, fine: Closing, closed: Closed) -> Closed | None:
 
 def _half_resumed(coarse: Closing, fine: Closing, gap_mm: float) -> Closed:
     """A body started from the coarser one at a wider gap, then closed further."""
-    wider = coarse.uncompressed_mm + WIDER_SHARE * (gap_mm - coarse.uncompressed_mm)
+    wider = coarse.uncompressed_mm + WIDER_FACTOR * (gap_mm - coarse.uncompressed_mm)
     half = _resumed(coarse, fine, coarse.close(wider))
     if half is None:
         raise NotConvergedError("elements of a coarser mesh's answer turn inside out on the finer one")
@@ -116,7 +116,7 @@ def _carried(closed: Closed, coarse: Closing, fine: Closing) -> DampedState:
     held, anchors = np.zeros(moved.shape, dtype=bool), fine.points.copy()
     held[fine.back.nodes] = fine.back.held
     anchors[fine.back.nodes] += fine.back.pull_mm
-    positions = unfolded(fine.model, np.where(held, anchors, moved), held, HEALED_DET)
+    positions = untangled(fine.model, np.where(held, anchors, moved), held, HEALED_DET)
     pressure = interpolate_elements(closed.state.pressure, many, few)
     return DampedState(positions, pressure, closed.state.height, _carried_memory(closed, coarse, fine, positions))
 
@@ -129,12 +129,12 @@ def _carried_memory(closed: Closed, coarse: Closing, fine: Closing, positions: A
         return memory
     there, here = (c.contact.surface.positions(c.points).reshape(-1, 3) for c in (coarse, fine))
     distance, nearest = cKDTree(there).query(here, NEAREST_POINTS)
-    share = 1.0 / (np.asarray(distance) + 1e-9)
-    share /= share.sum(axis=1, keepdims=True)
+    weights = 1.0 / (np.asarray(distance) + 1e-9)
+    weights /= weights.sum(axis=1, keepdims=True)
 
     def carried(values: Array) -> Array:
         flat = values.reshape(len(plates), len(there), -1)
-        mixed = np.einsum("nk,pnkc->pnc", share, flat[:, nearest])
+        mixed = np.einsum("nk,pnkc->pnc", weights, flat[:, nearest])
         return np.asarray(mixed.reshape(len(plates), *memory.pressure.shape[1:], *values.shape[3:]))
 
     slip = old.anchor - coarse.contact.start(closed.deformed, plates, height).anchor

@@ -1,7 +1,7 @@
 """One implicit step of a damped equilibrium: Newton's method, kept downhill where it does not contract by itself.
 
 Far from an equilibrium Newton's updates bounce between contact and release, or follow a buckling body uphill. An
-update that is not clearly smaller than the last one is therefore searched along until a merit lessens: the potential
+update that is not clearly smaller than the last one therefore gets a line search until a merit lessens: the potential
 of everything that acts, the volume's part at a moderate bulk modulus beside the pressures at hand (an augmented
 Lagrangian). With the true modulus every finite update would seem to go uphill, for it keeps the volume to first order
 only. Where an update points uphill the tangent is not positive definite; more damping towards the place at hand makes
@@ -24,7 +24,7 @@ from mammoreg.fem.parts.part import Parts
 from mammoreg.fem.plates.state import DampedState, Load
 from mammoreg.fem.report import Stopwatch
 
-LEAST_DET_SHARE = 0.2  # a Newton step may shrink the smallest det F to this share of itself
+LEAST_DET_RATIO = 0.2  # a Newton step may shrink the smallest det F to this part of itself
 RUNAWAY_MM = 200.0
 CONTRACTING = 0.6  # an update above this share of the last one is searched along
 PLAIN_ITERATIONS, ITERATIONS = 14, 40
@@ -37,7 +37,7 @@ SHORT = 0.2
 
 
 @dataclass(frozen=True)
-class Balance:
+class ForceBalance:
     """Forces at a state: the elements' residual, and residual and tangent of each group of blocks."""
 
     internal: Residual
@@ -67,7 +67,7 @@ class DampedStep:
         equilibrium: body, contact and linear system.
         start: state towards which the step is damped.
         load: plates.
-        acting: parts at their share of the load, the back's springs first.
+        acting: parts at the load factor, the back's springs first.
         damping: factor of the damping.
     """
 
@@ -93,27 +93,27 @@ class DampedStep:
             self.equilibrium.residuals.append(self.system.unbalance(balance.vectors))
             update, pressure = self._update(balance)
             largest, settles = float(np.abs(update).max()), self.shift == 0.0
-            share = self._plain_share(state, update, largest, last) if iteration < PLAIN_ITERATIONS else 0.0
-            if share > 0.0:
-                state = _moved(state, share, update, pressure)
+            step_length = self._plain_step_length(state, update, largest, last) if iteration < PLAIN_ITERATIONS else 0.0
+            if step_length > 0.0:
+                state = _moved(state, step_length, update, pressure)
             else:
-                state = self._searched(state, balance, update, pressure)
+                state = self._line_search(state, balance, update, pressure)
             if settles and largest < tolerance_mm:
                 return state, ""
             last = largest
         return state, f"no equilibrium within {ITERATIONS} Newton iterations (last update {last:.2g} mm)"
 
-    def _plain_share(self, state: DampedState, update: Array, largest: float, last: float) -> float:
-        """Share of an update that goes as it is; 0: it has to be searched along."""
+    def _plain_step_length(self, state: DampedState, update: Array, largest: float, last: float) -> float:
+        """Step length of an update that needs no line search; 0: it has to be searched along."""
         if self.shift > 0.0 or largest > RUNAWAY_MM or largest > CONTRACTING * last:
             return 0.0
         try:
-            share = self.system.admissible(state.positions, update, LEAST_DET_SHARE)
+            step_length = self.system.admissible(state.positions, update, LEAST_DET_RATIO)
         except NotConvergedError:
             return 0.0
-        return share if np.isinf(last) or share == 1.0 else 0.0
+        return step_length if np.isinf(last) or step_length == 1.0 else 0.0
 
-    def _balance(self, state: DampedState) -> Balance:
+    def _balance(self, state: DampedState) -> ForceBalance:
         with self.watch.timing("contact"):
             contact = self.equilibrium.terms(state, self.load.plates)
         with self.watch.timing("assembly"):
@@ -122,41 +122,41 @@ class DampedStep:
             tangent = self.model.stiffness(elements, state.pressure, internal.coupling)
             pairs = [part.terms(state.positions) for part in self.acting]
         weight, count = self.damping * self.equilibrium.weight, len(self.equilibrium.springs)
-        damped = (weight * self._way(state))[:, None], weight[:, None, None]
+        damped = (weight * self._displacement(state))[:, None], weight[:, None, None]
         groups = [(internal.force, tangent), *pairs[:count], (contact.force, contact.stiffness), damped, *pairs[count:]]
-        return Balance(internal, [vector for vector, _ in groups], [block for _, block in groups])
+        return ForceBalance(internal, [vector for vector, _ in groups], [block for _, block in groups])
 
     def unbalance(self, state: DampedState) -> float:
         """Ratio of unbalanced to internal forces at a state."""
         return self.system.unbalance(self._balance(state).vectors)
 
-    def _way(self, state: DampedState) -> Array:
+    def _displacement(self, state: DampedState) -> Array:
         """Displacement (total,) since the start."""
         return np.append((state.positions - self.start.positions).ravel(), state.height - self.start.height)
 
-    def _searched(self, state: DampedState, balance: Balance, update: Array, pressure: Array) -> DampedState:
-        """The state after a part of an update that lessens the merit, damped more until there is one."""
+    def _line_search(self, state: DampedState, balance: ForceBalance, update: Array, pressure: Array) -> DampedState:
+        """Backtracking line search for less of the merit, along updates that are damped more until there is some."""
         gradient = self._gradient(balance)
         merit = self._merit(state.positions, state.height, state.pressure)
         for _ in range(SHIFTS):
             slope = float(gradient @ update)
             with self.watch.timing("search"):
-                share = self._descending(state, update, slope, merit) if slope < 0.0 else 0.0
-            if share > 0.0:
-                self._adapt(share)
-                return _moved(state, share, update, pressure)
+                step_length = self._descending(state, update, slope, merit) if slope < 0.0 else 0.0
+            if step_length > 0.0:
+                self._adapt(step_length)
+                return _moved(state, step_length, update, pressure)
             self.shift = max(SHIFT_GROWTH * self.shift, SHIFT)
             update, pressure = self._update(balance)
         raise NotConvergedError(self._blame(state, update))
 
-    def _adapt(self, share: float) -> None:
+    def _adapt(self, step_length: float) -> None:
         """More damping towards the place at hand after a short step, less after a whole one."""
-        if share < SHORT:
+        if step_length < SHORT:
             self.shift = max(SHIFT_GROWTH * self.shift, SHIFT)
-        elif share == 1.0:
+        elif step_length == 1.0:
             self.shift = self.shift / SHIFT_GROWTH if self.shift > LEAST_SHIFT else 0.0
 
-    def _update(self, balance: Balance) -> tuple[Array, Array]:
+    def _update(self, balance: ForceBalance) -> tuple[Array, Array]:
         """Newton's update, with more damping towards the present place where that has turned out to be needed."""
         blocks = list(balance.blocks)
         if self.shift > 0.0:
@@ -166,16 +166,16 @@ class DampedStep:
             return self.system.increment(balance.internal, balance.vectors, blocks)
 
     def _descending(self, state: DampedState, update: Array, slope: float, merit: float) -> float:
-        """Share of an update at which the merit has lessened; 0: there is none."""
+        """Step length at which the merit has lessened (Armijo); 0: there is none."""
         before = self.model.determinants(state.positions)
-        share = min(1.0, LARGEST_MM / float(np.abs(update).max()))
-        while share > SHORTEST:
-            positions = state.positions + share * update[:-1].reshape(-1, 3)
-            if (self.model.determinants(positions) > LEAST_DET_SHARE * before).all():
-                found = self._merit(positions, state.height + share * float(update[-1]), state.pressure)
-                if found <= merit + DESCENT * share * slope + 1e-12 * abs(merit):
-                    return share
-            share *= 0.5
+        step_length = min(1.0, LARGEST_MM / float(np.abs(update).max()))
+        while step_length > SHORTEST:
+            positions = state.positions + step_length * update[:-1].reshape(-1, 3)
+            if (self.model.determinants(positions) > LEAST_DET_RATIO * before).all():
+                found = self._merit(positions, state.height + step_length * float(update[-1]), state.pressure)
+                if found <= merit + DESCENT * step_length * slope + 1e-12 * abs(merit):
+                    return step_length
+            step_length *= 0.5
         return 0.0
 
     def _soft_bulk(self) -> Array:
@@ -184,7 +184,7 @@ class DampedStep:
         moderate = MERIT_BULK * material.mu_kpa
         return np.asarray(material.bulk_kpa * moderate / (material.bulk_kpa + moderate) / self.model.volume)
 
-    def _gradient(self, balance: Balance) -> Array:
+    def _gradient(self, balance: ForceBalance) -> Array:
         """Gradient (total,) of the merit, mN."""
         internal = balance.internal
         volumetric = (self._soft_bulk() * internal.volume)[:, None] * internal.coupling
@@ -197,8 +197,8 @@ class DampedStep:
         grown = (self.model.weights * (self.model.determinants(positions) - 1.0)).sum(axis=1)
         excess = grown - pressure / self.model.bulk_per_volume
         volume = float(np.sum(pressure * grown + 0.5 * self._soft_bulk() * excess**2))
-        way = np.append((positions - self.start.positions).ravel(), height - self.start.height)
-        return 1e3 * stored + volume + 0.5 * self.damping * float(self.equilibrium.weight @ way**2)
+        displacement = np.append((positions - self.start.positions).ravel(), height - self.start.height)
+        return 1e3 * stored + volume + 0.5 * self.damping * float(self.equilibrium.weight @ displacement**2)
 
     def _blame(self, state: DampedState, update: Array) -> str:
         """Which element is the first to turn inside out along an update, or that none is."""
@@ -207,15 +207,15 @@ class DampedStep:
         worst = int(np.argmin((after / before).min(axis=1)))
         medial, posterior, height = state.positions[self.model.hexes[worst]].mean(axis=0)
         place = f"element {worst} (medial {medial:.0f}, posterior {posterior:.0f}, height {height:.0f} mm)"
-        if after[worst].min() <= LEAST_DET_SHARE * before[worst].min():
+        if after[worst].min() <= LEAST_DET_RATIO * before[worst].min():
             return f"{place} turns inside out"
         return f"no way downhill; most strained is {place} with det F {before[worst].min():.2g}"
 
 
-def _moved(state: DampedState, share: float, update: Array, pressure: Array) -> DampedState:
+def _moved(state: DampedState, step_length: float, update: Array, pressure: Array) -> DampedState:
     return replace(
         state,
-        positions=state.positions + share * update[:-1].reshape(-1, 3),
-        pressure=state.pressure + share * pressure,
-        height=state.height + share * float(update[-1]),
+        positions=state.positions + step_length * update[:-1].reshape(-1, 3),
+        pressure=state.pressure + step_length * pressure,
+        height=state.height + step_length * float(update[-1]),
     )

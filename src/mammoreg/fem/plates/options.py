@@ -11,12 +11,12 @@ class ClosingOptions:
 
     Attributes:
         steps: load steps at least, but for `easy_iterations`; more where a step fails.
-        least_step: smallest share of the way before giving up.
+        least_step: smallest increment of the load factor before giving up.
         tolerance_mm: Newton iterations end below this; the breast rests when it moves less.
         damping: factor of the damping in load steps.
         rests: steps at rest, several times as many where the breast still moves.
         penalty_per_mm: stiffness of the contact in units of the mean shear modulus while the plates close.
-        stiffening: factors of that stiffness, one after the other, once the plates have closed.
+        contact_factors: of that stiffness, one after the other, once the plates have closed.
         band_mm: height of the contact's smooth onset.
         slip_mm: displacement at which friction reaches its limit.
         rule: contact points of a face.
@@ -34,7 +34,7 @@ class ClosingOptions:
     band_mm: float = 1.0
     slip_mm: float = 2.5
     rule: Rule = "simpson"
-    stiffening: tuple[float, ...] = (3.0, 10.0)
+    contact_factors: tuple[float, ...] = (3.0, 10.0)
     augmentations: int = 0
     penetration_mm: float = 0.01
     easy_iterations: int = 0
@@ -42,7 +42,7 @@ class ClosingOptions:
     @property
     def stiffest(self) -> float:
         """Factor of the contact's stiffness at rest."""
-        return self.stiffening[-1] if self.stiffening else 1.0
+        return self.contact_factors[-1] if self.contact_factors else 1.0
 
 
 COARSE = ClosingOptions(steps=5, tolerance_mm=0.5, damping=1.0, rests=7, band_mm=2.0)

@@ -11,19 +11,16 @@ from mammoreg.fem.plates.result import Closed, closed_state
 from mammoreg.fem.plates.state import DampedState, Load
 
 STIFF_DAMPING = 0.25  # of the first rest in the stiffened contact, as a share of the damping before
-REST_SHARE = 0.01  # the damping that remains at the end, as a share of that of the load steps
+REST_DAMPING = 0.01  # the damping that remains at the end, as a share of that of the load steps
 HARDER = 10.0  # a step that fails is tried again with this much more damping
 PATIENCE = 4  # a breast that does not rest yet gets so many times the steps
-DEEP, HARDENINGS, HARDER_CONTACT = (
-    0.05,
-    4,
-    3.0,
-)  # skin deeper in the plates, as a share of their gap, hardens them so many times at most
+# Skin deeper in the plates, as a share of their gap, hardens the contact by a factor, so many times at most.
+DEEP, HARDENINGS, HARDER_CONTACT = 0.05, 4, 3.0
 LARGEST_PENETRATION = 0.2  # of the gap: no longer a breast between plates
 RESTLESS_MM = 1.0  # a breast that still moves further in its last step has not come to rest
 
 
-class Resting:
+class Relaxation:
     """A breast between plates that stand.
 
     Args:
@@ -58,12 +55,12 @@ class Resting:
         """
         contact, eased = self.equilibrium, _unshifted(state)
         try:
-            for factor in self.options.stiffening:
+            for factor in self.options.contact_factors:
                 eased = self.eased(contact, eased, damping)
                 contact = self.equilibrium.with_contact(self.equilibrium.contact.stiffened(factor))
             closed = self._rested(self.stiff, eased, STIFF_DAMPING * damping)
         except NotConvergedError:
-            if not self.options.stiffening:
+            if not self.options.contact_factors:
                 raise
             self.cuts += 1
             return self._between(self._rested(self.equilibrium, _unshifted(state), damping))
@@ -89,7 +86,7 @@ class Resting:
     def _hardened(self, closed: Closed, damping: float) -> Closed:
         """At rest in contacts stiffer still, as tissue needs that has become stiffer by far than it was at first."""
         factor = self.options.stiffest
-        for _ in range(HARDENINGS if self.options.stiffening else 0):
+        for _ in range(HARDENINGS if self.options.contact_factors else 0):
             if self.stiff.penetration_mm(closed.state, self.load.plates) <= DEEP * self.gap_mm:
                 break
             factor *= HARDER_CONTACT
@@ -126,12 +123,12 @@ class Resting:
                 continue
             moved = np.inf if reason else float(np.abs(after.positions - state.positions).max())
             state, factor = after, factor if reason else 0.25 * factor
-            if moved < 2.0 * tolerance and factor < REST_SHARE * damping:
+            if moved < 2.0 * tolerance and factor < REST_DAMPING * damping:
                 break
         if not np.isfinite(moved) or moved > RESTLESS_MM:
             raise NotConvergedError(f"the breast does not come to rest between the plates (last moved {moved:.1f} mm)")
         if self.options.augmentations > 0:
-            state = self._augmented(contact, state, REST_SHARE * damping)
+            state = self._augmented(contact, state, REST_DAMPING * damping)
         return closed_state(contact, state, self.load, self.gap_mm, moved, self.steps, self.cuts)
 
     def _augmented(self, contact: DampedEquilibrium, state: DampedState, damping: float) -> DampedState:

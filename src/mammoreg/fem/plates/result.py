@@ -76,7 +76,7 @@ def closed_state(
         raise NotConvergedError(f"forces at rest are out of balance by {unbalance:.1%}")
     forces = np.abs(terms.plate_force[:, 2]) * 1e-3
     force_n = (float(forces[0]), float(forces[1]))
-    parts = parts_at((*equilibrium.springs, *(state.parts or ())), load.share)
+    parts = parts_at((*equilibrium.springs, *(state.parts or ())), load.factor)
     report = solve_report(
         model,
         state.positions,

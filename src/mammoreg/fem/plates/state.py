@@ -29,7 +29,7 @@ class DampedState:
 
 @dataclass(frozen=True)
 class Load:
-    """What a step loads: plates (lower, upper), and the share of the back's pull and of gradual parts."""
+    """What a step loads: plates (lower, upper), and the load factor of the back's pull and of gradual parts."""
 
     plates: tuple[Plate, Plate]
-    share: float = 1.0
+    factor: float = 1.0

@@ -12,7 +12,7 @@ RINGS = (0, 1, 2)
 _COMPRESSIBLE = neo_hookean(1.0, 0.3)
 
 
-def unfolded(model: HyperelasticModel, positions: Array, held: NDArray[np.bool_], least: float) -> Array:
+def untangled(model: HyperelasticModel, positions: Array, held: NDArray[np.bool_], least: float) -> Array:
     """Nodes (N, 3) whose elements are squeezed to det F below `least` less, if that can be had.
 
     The nodes of such elements, and of rings around them, take the small-strain equilibrium between the others.

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.linear.sparse import Array
-from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, State
+from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, PrescribedState
 from mammoreg.materials.cube import CUBE_MM3
 from mammoreg.materials.elastic import hyperelastic
 from mammoreg.materials.isochoric import IsochoricLaw
@@ -70,7 +70,7 @@ def press_cube(
     goal = mesh.points.copy()
     goal[upper, 2] -= compression * volume_mm3 ** (1.0 / 3.0)
     equilibrium = Equilibrium(model, held)
-    state, steps, cuts = _in_steps(equilibrium, State(model.points, np.zeros(len(model.hexes))), goal)
+    state, steps, cuts = _in_steps(equilibrium, PrescribedState(model.points, np.zeros(len(model.hexes))), goal)
     return PressedCube(
         force_n=-1e-3 * float(equilibrium.reaction(state)[upper, 2].sum()),
         deformed=state.positions,
@@ -83,20 +83,20 @@ def press_cube(
     )
 
 
-def _in_steps(equilibrium: Equilibrium, state: State, goal: Array) -> tuple[State, int, int]:
+def _in_steps(equilibrium: Equilibrium, state: PrescribedState, goal: Array) -> tuple[PrescribedState, int, int]:
     """Move the held components to their goal, in steps that follow the iterations' ease."""
     origin, done, step, steps, cuts = state.positions, 0.0, FIRST_STEP, 0, 0
     while done < 1.0:
-        share = min(1.0, done + step)
+        load_factor = min(1.0, done + step)
         before = len(equilibrium.residuals)
         try:
-            state = equilibrium.solve(state, origin + share * (goal - origin), _NEWTON)
+            state = equilibrium.solve(state, origin + load_factor * (goal - origin), _NEWTON)
         except NotConvergedError as error:
             cuts, step = cuts + 1, 0.5 * step
             if step < LEAST_STEP:
                 raise NotConvergedError(f"{error}; the plates came {done:.0%} of their way") from error
             continue
-        done, steps = share, steps + 1
+        done, steps = load_factor, steps + 1
         if len(equilibrium.residuals) - before <= EASY_ITERATIONS:
             step = min(2.0 * step, LARGEST_STEP)
     return state, steps, cuts

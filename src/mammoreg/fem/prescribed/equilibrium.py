@@ -14,7 +14,7 @@ from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.parts.part import Part, Parts, all_nodes, back_springs, parts_at
 from mammoreg.fem.report import Stopwatch
 
-LEAST_DET_SHARE = 0.1
+LEAST_DET_RATIO = 0.1
 NEGLIGIBLE = 1e-6  # of the largest last displacement
 
 
@@ -34,7 +34,7 @@ class NewtonOptions:
 
 
 @dataclass(frozen=True)
-class State:
+class PrescribedState:
     """A deformation: nodes (N, 3), mm, extra ones behind the body's, and element pressures (E,), kPa."""
 
     positions: Array
@@ -75,20 +75,22 @@ class Equilibrium:
         groups = [part.dofs for part in self.parts]
         return NewtonSystem(self.model, groups, np.flatnonzero(~self.held.ravel()), self.held.size)
 
-    def solve(self, start: State, targets: Array, options: NewtonOptions, share: float = 1.0) -> State:
+    def solve(
+        self, start: PrescribedState, targets: Array, options: NewtonOptions, load_factor: float = 1.0
+    ) -> PrescribedState:
         """Find the equilibrium whose held components stand at their targets (N, 3), mm; then renew the parts.
 
         Args:
             start: where to begin.
             targets: places of the held components.
             options: when the iteration ends.
-            share: of the load of gradual parts.
+            load_factor: of the load of gradual parts.
 
         Raises:
             NotConvergedError: no equilibrium within the iterations, or elements turn inside out.
         """
         state, last = start, np.inf
-        acting = parts_at(self.parts, share)
+        acting = parts_at(self.parts, load_factor)
         pending = np.where(self.held, targets - start.positions, 0.0).ravel()
         imposed: Array | None = pending if pending.any() else None
         for _ in range(options.iterations):
@@ -104,23 +106,23 @@ class Equilibrium:
                 return state
             with self.watch.timing("linear"):
                 update, pressure = self.system.increment(internal, vectors, blocks, imposed)
-            admissible = self.system.admissible(state.positions, update, LEAST_DET_SHARE)
+            admissible = self.system.admissible(state.positions, update, LEAST_DET_RATIO)
             if imposed is not None and admissible < 1.0:
                 raise NotConvergedError("an element turns inside out")
             positions = state.positions + admissible * update.reshape(-1, 3)
-            state, imposed = State(positions, state.pressure + admissible * pressure), None
+            state, imposed = PrescribedState(positions, state.pressure + admissible * pressure), None
             last = admissible * float(np.abs(update).max())
         raise NotConvergedError(f"no equilibrium within {options.iterations} Newton iterations (residual {ratio:.1e})")
 
-    def reaction(self, state: State, share: float = 1.0) -> Array:
+    def reaction(self, state: PrescribedState, load_factor: float = 1.0) -> Array:
         """Force (N, 3) in mN that holds the nodes in a state."""
-        return self.system.sum(self._terms(state, parts_at(self.parts, share))[1]).reshape(-1, 3)
+        return self.system.sum(self._terms(state, parts_at(self.parts, load_factor))[1]).reshape(-1, 3)
 
-    def unbalance(self, state: State) -> float:
+    def unbalance(self, state: PrescribedState) -> float:
         """Ratio of unbalanced to internal forces at a state under the whole load."""
         return self.system.unbalance(self._terms(state, self.parts)[1])
 
-    def _renew(self, state: State) -> None:
+    def _renew(self, state: PrescribedState) -> None:
         before, self.parts = self.parts, tuple(part.renewed(state.positions) for part in self.parts)
         if any(
             new is not old and not np.array_equal(new.dofs, old.dofs)
@@ -128,7 +130,7 @@ class Equilibrium:
         ):
             self.system = self._system()
 
-    def _terms(self, state: State, acting: Parts) -> tuple[Residual, list[Array], list[Array]]:
+    def _terms(self, state: PrescribedState, acting: Parts) -> tuple[Residual, list[Array], list[Array]]:
         """The elements' residual, and residual and tangent of each group."""
         elements = self.model.state(state.positions)
         internal = self.model.residual(elements, state.pressure)

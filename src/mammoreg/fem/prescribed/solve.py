@@ -10,7 +10,7 @@ from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.parts.back import Array, BackCondition
 from mammoreg.fem.parts.part import Part, all_nodes
-from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, State
+from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, PrescribedState
 from mammoreg.fem.report import SolveReport, solve_report
 
 
@@ -19,7 +19,7 @@ class PrescribedOptions:
     """Steps of the way from the start to the prescribed places.
 
     Attributes:
-        first_step, least_step: share of the way in the first step, and the smallest before giving up.
+        first_step, least_step: load factor of the first step, and the smallest before giving up.
         easy_iterations: a step of at most this many Newton iterations doubles the next one.
         newton: when an iteration ends.
     """
@@ -95,27 +95,27 @@ def solve_prescribed(
     origin = points.copy()
     if start is not None:
         origin[: len(start)] = start
-    state = State(origin, np.zeros(len(model.hexes)) if pressure is None else pressure)
+    state = PrescribedState(origin, np.zeros(len(model.hexes)) if pressure is None else pressure)
     equilibrium = Equilibrium(model, held, back, parts, extra_nodes)
     done, step, steps, cuts = 0.0, options.first_step, 0, 0
     while done < 1.0:
-        share = min(1.0, done + step)
+        load_factor = min(1.0, done + step)
         before = len(equilibrium.residuals)
         try:
-            state = equilibrium.solve(state, origin + share * (goal - origin), options.newton, share)
+            state = equilibrium.solve(state, origin + load_factor * (goal - origin), options.newton, load_factor)
         except NotConvergedError as error:
             cuts, step = cuts + 1, 0.5 * step
             if step < options.least_step:
                 raise NotConvergedError(f"{error}; the prescribed nodes came {done:.0%} of their way") from error
             continue
-        done, steps = share, steps + 1
+        done, steps = load_factor, steps + 1
         if len(equilibrium.residuals) - before <= options.easy_iterations:
             step *= 2.0
     return _result(equilibrium, state, nodes, steps, cuts)
 
 
 def _result(
-    equilibrium: Equilibrium, state: State, nodes: NDArray[np.integer], steps: int, cuts: int
+    equilibrium: Equilibrium, state: PrescribedState, nodes: NDArray[np.integer], steps: int, cuts: int
 ) -> PrescribedResult:
     """The result in a state, and its report."""
     model, count = equilibrium.model, len(equilibrium.model.points)

@@ -43,7 +43,7 @@ class SkinInterface:
         drag: of the springs where skin slides, kPa/mm.
         adherent: whether skin sticks where it touches.
         face: faces (M,) of the feet.
-        shape: shares (M, 4) of their corners.
+        shape: weights (M, 4) of their corners.
         normal: unit normals (M, 3) there, outward.
         stuck: where skin sticks (M,); its foot stays.
     """
@@ -74,9 +74,9 @@ class SkinInterface:
         hold = np.where(self.stuck, self.stiffness, self.drag)
         pull = -pressure[:, None] * self.normal + hold[:, None] * (apart - gap[:, None] * self.normal)
         stiff = slope[:, None, None] * dyad + hold[:, None, None] * (np.eye(3) - dyad)
-        shares = np.column_stack([np.ones(len(self.nodes)), -self.shape])
-        force = shares[:, :, None] * (self.area[:, None] * pull)[:, None, :]
-        weights = self.area[:, None, None] * shares[:, :, None] * shares[:, None, :]
+        signed = np.column_stack([np.ones(len(self.nodes)), -self.shape])
+        force = signed[:, :, None] * (self.area[:, None] * pull)[:, None, :]
+        weights = self.area[:, None, None] * signed[:, :, None] * signed[:, None, :]
         blocks = weights[:, :, None, :, None] * stiff[:, None, :, None, :]
         return force.reshape(-1, 15), blocks.reshape(-1, 15, 15)
 

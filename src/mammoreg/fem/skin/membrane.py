@@ -72,10 +72,10 @@ class Membrane:
     def energy_mj(self, positions: Array) -> float:
         """Strain energy in mJ at nodes (N, 3)."""
         stretch = _stretch(self._tangents(positions))
-        share = self.compression_share
-        density = (1.0 - share) * self.law.energy_kpa(relaxed_invariant(stretch).value)
-        if share > 0.0:
-            density = density + share * self.law.energy_kpa(full_invariant(stretch).value)
+        fraction = self.compression_share
+        density = (1.0 - fraction) * self.law.energy_kpa(relaxed_invariant(stretch).value)
+        if fraction > 0.0:
+            density = density + fraction * self.law.energy_kpa(full_invariant(stretch).value)
         return float((density * self.area).sum()) * self.thickness_mm * 1e-3
 
     def renewed(self, _positions: Array) -> "Membrane":
@@ -88,9 +88,9 @@ class Membrane:
 
     def _response(self, stretch: Array) -> tuple[Array, Array]:
         """Second Piola-Kirchhoff stress (F, 4, 3), kPa, and its derivative by the Green strain (F, 4, 3, 3)."""
-        share = self.compression_share
+        fraction = self.compression_share
         stress, moduli = np.zeros(stretch.shape), np.zeros((*stretch.shape, 3))
-        kinds = ((1.0 - share, relaxed_invariant), (share, full_invariant))
+        kinds = ((1.0 - fraction, relaxed_invariant), (fraction, full_invariant))
         for part, kind in kinds:
             if part == 0.0:
                 continue

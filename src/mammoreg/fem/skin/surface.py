@@ -20,12 +20,12 @@ WALKS = 3
 
 
 @dataclass(frozen=True)
-class Projection:
+class NearestPoints:
     """Feet of points on the surface.
 
     Attributes:
         face: number of the face (M,).
-        shape: shares (M, 4) of its corners at the foot.
+        shape: weights (M, 4) of its corners at the foot.
         normal: outward unit normal (M, 3) there.
     """
 
@@ -47,7 +47,7 @@ class QuadSurface:
         self.around = _faces_around(self.quads)
 
     def faces_of(self, nodes: Integers) -> tuple[Integers, Array]:
-        """A face (M,) that holds each node (M,), and the corners' shares (M, 4) there, 1 at the node."""
+        """A face (M,) that holds each node (M,), and the corners' weights (M, 4) there, 1 at the node."""
         flat = self.quads.ravel()
         order = np.argsort(flat, kind="stable")
         place = order[np.searchsorted(flat[order], nodes)]
@@ -71,7 +71,7 @@ class QuadSurface:
         """Unit normals (M, 3) at places on faces."""
         return _unit(np.einsum("ma,mai->mi", shape, self.normals(positions)[self.quads[face]]))
 
-    def project(self, points: Array, positions: Array, last: Integers) -> Projection:
+    def project(self, points: Array, positions: Array, last: Integers) -> NearestPoints:
         """Feet of points (M, 3) on the surface with nodes at positions (N, 3), sought around the faces `last` (M,)."""
         normals, face = self.normals(positions), last
         for _ in range(WALKS):
@@ -87,8 +87,8 @@ class QuadSurface:
             if np.array_equal(found, face):
                 break
             face = found
-        shape = _shares(np.clip(local[rows, best], -1.0, 1.0))
-        return Projection(found, shape, self.normal_at(positions, found, shape))
+        shape = _shape_functions(np.clip(local[rows, best], -1.0, 1.0))
+        return NearestPoints(found, shape, self.normal_at(positions, found, shape))
 
 
 def _feet(points: Array, corners: Array, normals: Array) -> tuple[Array, Array]:
@@ -96,7 +96,7 @@ def _feet(points: Array, corners: Array, normals: Array) -> tuple[Array, Array]:
     local = np.zeros((*corners.shape[:2], 2))
     height = np.zeros(corners.shape[:2])
     for _ in range(NEWTON_STEPS):
-        shape, slopes = _shares(local), _slopes(local)
+        shape, slopes = _shape_functions(local), _slopes(local)
         foot, normal = _weighted(shape, corners), _weighted(shape, normals)
         tangent = np.einsum("mrad,mrai->mrid", slopes, corners + height[..., None, None] * normals)
         miss = points[:, None] - foot - height[..., None] * normal
@@ -108,14 +108,14 @@ def _feet(points: Array, corners: Array, normals: Array) -> tuple[Array, Array]:
         # A face far off need not be met: three of its own widths say that it is not the one.
         local = np.clip(local + np.stack([along, beside], axis=-1), -3.0, 3.0)
         height = height + np.einsum("mri,mri->mr", across, miss) / volume
-    return local, height * np.linalg.norm(_weighted(_shares(local), normals), axis=-1)
+    return local, height * np.linalg.norm(_weighted(_shape_functions(local), normals), axis=-1)
 
 
 def _weighted(shape: Array, values: Array) -> Array:
     return np.asarray(np.einsum("mra,mrai->mri", shape, values))
 
 
-def _shares(local: Array) -> Array:
+def _shape_functions(local: Array) -> Array:
     """Bilinear shape functions (..., 4)."""
     return np.asarray(0.25 * (1.0 + local[..., 0, None] * CORNERS[:, 0]) * (1.0 + local[..., 1, None] * CORNERS[:, 1]))
 

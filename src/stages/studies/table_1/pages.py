@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mammoreg.materials.catalogue import Tissue
+from mammoreg.materials.catalogue import CatalogueTissue
 from stages.formats.pages import Section, as_csv, as_html, as_markdown
 
 NAME = "table_1_forces"
@@ -38,7 +38,7 @@ class CubeForces:
 
     model: str
     name: str
-    tissue: Tissue
+    tissue: CatalogueTissue
     compression: float
     paper_n: float | None
     bulk_kpa: float

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.prescribed.cube import Faces, press_cube
-from mammoreg.materials.catalogue import CATALOGUE, Tissue
+from mammoreg.materials.catalogue import CATALOGUE, CatalogueTissue
 from mammoreg.materials.cube import HIGH_COMPRESSION, LOW_COMPRESSION, cube_force_n
 from mammoreg.materials.elastic import tangent_bulk_kpa
 from mammoreg.materials.laws import Law
@@ -47,7 +47,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
 def _forces(model: str, name: str, compression: float, meshes: Sequence[int], poisson: float) -> CubeForces:
     """One entry of the table by all routes."""
     entry = CATALOGUE[model]
-    tissue: Tissue = getattr(entry, name)
+    tissue: CatalogueTissue = getattr(entry, name)
     bulk = tangent_bulk_kpa(tissue.law, compression, poisson)
     once, twice = (_cube_n(tissue.law, factor * bulk, compression, _COARSE, "sliding") for factor in (1.0, 2.0))
     return CubeForces(
