@@ -5,7 +5,7 @@ import pytest
 
 from mammoreg.geometry import Volume
 from mammoreg.geometry.frames import plate_rotation
-from mammoreg.localization.to_compressed import fit_surface_to_outline, signed_distance
+from mammoreg.localization.to_compressed import SecondVolume, fit_surface_to_outline, signed_distance
 
 
 def half_ball_mask(radius: float = 60.0, spacing: float = 2.0) -> Volume:
@@ -55,9 +55,38 @@ def test_outline_fit_recovers_a_turn() -> None:
     radii, shift = (60.0, 70.0, 40.0), np.array([2.0, -3.0, 4.0])
     turn = plate_rotation(8.0)
     points = skin_points(radii)
-    placed = fit_surface_to_outline(points, signed_distance(ellipsoid_mask(radii, shift, turn)), rotate=True)
+    outline = signed_distance(ellipsoid_mask(radii, shift, turn))
+    placed = fit_surface_to_outline(points, outline, rotate=True, base_mm=1.0)
     inner = 0.5 * points
     assert np.linalg.norm(placed.forward(inner) - (inner @ turn.T + shift), axis=1).max() < 1.0
+
+
+def second_volume_of(radii: tuple[float, float, float], shift: np.ndarray, turn: np.ndarray) -> SecondVolume:
+    return SecondVolume(ellipsoid_mask(radii, shift, turn), skin_points((60.0, 70.0, 40.0))[::3])
+
+
+@pytest.mark.parametrize("shift", [(4.0, -6.0, 10.0), (-2.0, 4.0, -8.0)])
+def test_rigid_recovers_a_translation_and_turns_nothing(shift: tuple[float, float, float]) -> None:
+    """By whole voxels, so that what the voxels' steps do to one place they do to the other."""
+    inner = 0.5 * skin_points((60.0, 70.0, 40.0))
+    before, after = (
+        second_volume_of((60.0, 70.0, 40.0), np.array(s), np.eye(3)).rigid(inner) for s in ((0.0, 0.0, 0.0), shift)
+    )
+    np.testing.assert_allclose(after - before, np.broadcast_to(shift, inner.shape), atol=1e-3)
+    np.testing.assert_allclose(before - inner, np.broadcast_to((before - inner)[0], inner.shape), atol=1e-9)
+    np.testing.assert_allclose(before, inner, atol=0.4)
+
+
+def test_rigid_does_not_turn_a_body_that_is_only_pressed_flat() -> None:
+    inner = 0.5 * skin_points((60.0, 70.0, 40.0))
+    carried = second_volume_of((68.0, 76.0, 32.0), np.array([0.0, 0.0, -12.0]), np.eye(3)).rigid(inner)
+    np.testing.assert_allclose(carried - inner, np.broadcast_to((carried - inner).mean(axis=0), inner.shape), atol=1e-9)
+
+
+def test_rigid_turns_with_the_body() -> None:
+    inner, turn = 0.5 * skin_points((60.0, 70.0, 40.0)), plate_rotation(12.0)
+    carried = second_volume_of((66.0, 70.0, 36.0), np.array([0.0, 0.0, -12.0]), turn).rigid(inner)
+    assert np.linalg.norm(carried - (inner @ turn.T + [0.0, 0.0, -12.0]), axis=1).max() < 2.5
 
 
 def test_slopes_over_a_wide_base_find_one_place_from_everywhere() -> None:

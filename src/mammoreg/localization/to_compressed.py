@@ -16,6 +16,8 @@ from mammoreg.localization.deformation import AffineDeformation, MethodView
 
 Floats = NDArray[np.float64]
 _ROBUST_MM = 2.0
+_RIGID_BASE_MM = 1.0  # about a voxel of the working grid
+_TURN_RAD = 0.02  # moves a breast's skin about as far as 1 mm does
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ class SecondVolume:
 
     def rigid(self, points: Points) -> Points:
         """Points (N, 3) of the undeformed breast by the best rigid fit of its skin."""
-        return fit_surface_to_outline(self.skin, self.outline, rotate=True).forward(points)
+        return fit_surface_to_outline(self.skin, self.outline, rotate=True, base_mm=_RIGID_BASE_MM).forward(points)
 
     def place(self, way: MethodView, drawn_mm: Sequence[float], points: Points) -> Points:
         """Points (N, 3) of the undeformed breast where a method and the mask put them."""
@@ -77,20 +79,22 @@ def fit_surface_to_outline(
     """The rigid motion that lays a surface best on a body's outline.
 
     The distances between the surface's points and the outline are minimised with a soft L1 loss (scale 2 mm), because
-    a deformed breast does not fit everywhere.
+    a deformed breast does not fit everywhere. A rotation is sought from the best shift and from the surface's own
+    place, and kept only where it lowers that loss by more than what rounding to voxels makes of it.
 
     Args:
         surface: points (N, 3) on the skin, mm, in the outline's frame and near their place.
         outline: `signed_distance` of the body, of which the chest may be part.
         rotate: let the surface turn about its centroid too, not only shift.
         base_mm: half the distance over which slopes are taken; None: as short as rounding allows. Distances on voxels
-            have kinks, at which a fit by such short slopes stops some tenths of a millimetre early.
+            have kinks, at which a fit by such short slopes stops early: a shift by some tenths of a millimetre, a
+            rotation by degrees.
     """
     middle = surface.mean(axis=0)
     last = np.array(outline.shape) - 1
 
     def motion(parameters: Floats) -> AffineDeformation:
-        turn = Rotation.from_rotvec(parameters[3:]).as_matrix() if rotate else np.eye(3)
+        turn = Rotation.from_rotvec(parameters[3:]).as_matrix() if len(parameters) > 3 else np.eye(3)
         return AffineDeformation(turn, middle + parameters[:3] - turn @ middle)
 
     def misfit(parameters: Floats) -> Floats:
@@ -99,11 +103,22 @@ def fit_surface_to_outline(
         beyond = np.linalg.norm((index - held) * outline.spacing, axis=1)
         return np.asarray(outline.sample(outline.to_world(held)) + beyond, dtype=float)
 
-    start = np.zeros(6 if rotate else 3)
-    scale = np.array([1.0] * 3 + [0.02] * (len(start) - 3))
+    shifted = _least(misfit, np.zeros(3), base_mm, 1e-6)
+    if not rotate:
+        return motion(shifted.x)
+    starts = (np.concatenate([shifted.x, np.zeros(3)]), np.zeros(6))
+    turned = min((_least(misfit, start, base_mm, 1e-4) for start in starts), key=lambda found: float(found.cost))
+    rounding = 0.5 * len(surface) * float(np.mean(outline.spacing**2)) / 12.0
+    return motion(turned.x if turned.cost < shifted.cost - rounding else shifted.x)
+
+
+def _least(misfit: Callable[[Floats], Floats], start: Floats, base_mm: float | None, settled: float) -> Any:
+    """Least soft L1 loss of distances over a shift, mm, and a rotation vector, rad, from a start (3,) or (6,)."""
+    scale = np.array([1.0] * 3 + [_TURN_RAD] * (len(start) - 3))
     slopes: Any = "2-point" if base_mm is None else _central_slopes(misfit, base_mm * scale)
-    found = optimize.least_squares(misfit, start, slopes, loss="soft_l1", f_scale=_ROBUST_MM, x_scale=scale, xtol=1e-6)
-    return motion(found.x)
+    return optimize.least_squares(
+        misfit, start, slopes, loss="soft_l1", f_scale=_ROBUST_MM, x_scale=scale, xtol=settled
+    )
 
 
 def _central_slopes(function: Callable[[Floats], Floats], steps: Floats) -> Callable[[Floats], Floats]:

@@ -51,6 +51,12 @@ class BlockMesh:
         """Sorted nodes of the five faces other than the back; the back's rim is among them."""
         return np.unique(self.skin_quads())
 
+    def rim(self) -> NDArray[np.bool_]:
+        """Which nodes ((n + 1)^3,) lie where skin and back meet: the skin goes on there, the mesh does not."""
+        inside = np.zeros(len(self.points), dtype=bool)
+        inside[np.intersect1d(self.skin_nodes(), self.back_nodes())] = True
+        return inside
+
     def skin_quads(self) -> Indices:
         """Quadrilaterals (5 n^2, 4) of the skin with outward normals: -i, +i, -j, +j faces and the cap."""
         grid = self.node_grid()

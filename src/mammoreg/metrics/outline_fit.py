@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import Silhouette
@@ -16,8 +17,8 @@ class OutlineFit:
 
     Attributes:
         mean_mm, p95_mm: distance along the outline's normal, at the detector, weighted by the outline's length; only
-            where the outline is skin and fully trusted, None where it nowhere is.
-        dice: of the areas in front of the chest-wall edge, on the rays that both cross.
+            where the outline is skin and fully trusted and meets the model's skin, None where it nowhere does.
+        dice: of the areas in front of the chest-wall edge, on the rays on which both show skin.
     """
 
     mean_mm: float | None
@@ -25,11 +26,14 @@ class OutlineFit:
     dice: float | None
 
 
-def outline_fit(outline: RadialOutline, model: Silhouette) -> OutlineFit:
-    """Compare a silhouette with the outline on the same rays."""
-    gap = np.abs(outline.normal_gap(model))
-    trusted = (outline.weight >= _FULL) & np.isfinite(gap)
-    both = np.isfinite(outline.radius) & np.isfinite(model.radius)
+def outline_fit(outline: RadialOutline, model: Silhouette, rim: NDArray[np.bool_]) -> OutlineFit:
+    """Compare a silhouette with the outline on the same rays.
+
+    Where the silhouette runs along the model's `rim`, a mark (N,) of its nodes, the model ends and skin does not.
+    """
+    gap, skin = np.abs(outline.normal_gap(model)), ~model.between(rim)
+    trusted = (outline.weight >= _FULL) & np.isfinite(gap) & skin
+    both = np.isfinite(outline.radius) & np.isfinite(model.radius) & skin
     true, found = outline.radius[both] ** 2, model.radius[both] ** 2
     dice = float(2.0 * np.minimum(true, found).sum() / (true + found).sum()) if both.any() else None
     if not trusted.any():

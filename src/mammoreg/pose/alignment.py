@@ -48,7 +48,7 @@ def measure(
     """
     model = outline.of_model(detector_mm(points, view), quads)
     gap = outline.normal_gap(model) / view.middle_magnification
-    seen = np.isfinite(gap) if rim is None else np.isfinite(gap) & ~rim[model.edge_nodes].all(axis=1)
+    seen = np.isfinite(gap) if rim is None else np.isfinite(gap) & ~model.between(rim)
     weight = np.where(seen, outline.weight, 0.0)
     total = float(weight.sum())
     squares = float(np.sum(weight * np.nan_to_num(gap) ** 2))

@@ -38,6 +38,10 @@ class Silhouette:
         """The silhouette (K, 2) as (forward, along) at the detector, mm."""
         return polar_to_detector(self.theta, self.radius, self.centre_along_mm)
 
+    def between(self, marked: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Rays (K,) on which an edge between two of the marked surface nodes (N,) makes the silhouette."""
+        return np.asarray((self.edge_nodes[:, 0] >= 0) & marked[self.edge_nodes].all(axis=1))
+
 
 def polar_to_detector(
     theta: NDArray[np.float64], radius: NDArray[np.float64], centre_along_mm: float

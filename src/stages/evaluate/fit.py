@@ -79,7 +79,7 @@ def _fit_columns(outline: RadialOutline | None, block: BlockMesh, way: MethodVie
     if outline is None:
         return {"outline_mean_mm": None, "outline_p95_mm": None, "outline_dice": None}
     projected = detector_mm(way.deformation.forward(block.points), way.geometry)
-    fit = outline_fit(outline, outline.of_model(projected, block.skin_quads()))
+    fit = outline_fit(outline, outline.of_model(projected, block.skin_quads()), block.rim())
     zoom = way.geometry.middle_magnification
     return {
         "outline_mean_mm": None if fit.mean_mm is None else fit.mean_mm / zoom,
