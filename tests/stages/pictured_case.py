@@ -8,7 +8,7 @@ import nibabel
 import numpy as np
 from PIL import Image
 
-from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry import breast_to_lps
 from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
 from stages.engine.contract import Subject
@@ -96,8 +96,8 @@ def _add_images(path: Path) -> None:
 
 
 def _write_marks(folder: Path, laterality: Laterality, views: list[str]) -> dict[str, Path]:
-    marks = {name: lps_to_breast(point, laterality) for name, point in LANDMARKS.items()}
-    lesion = lps_to_breast(LESION, laterality)
+    marks = {name: breast_to_lps(point, laterality) for name, point in LANDMARKS.items()}
+    lesion = breast_to_lps(LESION, laterality)
     files = {
         "mr_landmarks": _table(folder / "mr.tsv", "name x y z", [[n, *p] for n, p in marks.items()]),
         "mr_lesion": _table(folder / "lesion.tsv", "name x y z diameter_mm", [["lesion", *lesion, LESION_DIAMETER_MM]]),

@@ -10,7 +10,7 @@ from PIL import Image
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.breast.placed import closing_plates, place_breast
 from mammoreg.fem.plates.closing import ClosingOptions
-from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate, lps_to_breast
+from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, breast_to_plate
 from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.deformation import MeshDeformation, ReferenceMesh
 from mammoreg.materials.attenuation import attenuation_map
@@ -95,13 +95,13 @@ def write_start(
     volumes = {"labels": tissue, "breast_mask": tissue.with_data((tissue.data > 0).astype(np.uint8))}
     if compressed:
         volumes["compressed_mask"] = second_mask()
-    nipple = lps_to_breast(np.array([0.0, -78.0, 0.0]), laterality)
+    nipple = breast_to_lps(np.array([0.0, -78.0, 0.0]), laterality)
     segment = Fields(
         arrays={"nipple": Array(nipple, "mm", "nipple")},
-        volumes={n: VolumeField(v.between_lps_and_breast(laterality), "1", n) for n, v in volumes.items()},
+        volumes={n: VolumeField(v.to_lps(laterality), "1", n) for n, v in volumes.items()},
     )
     write_artefact(found["segment"], header("segment", laterality), segment)
-    arrays = {"points": Array(lps_to_breast(MESH.points, laterality), "mm", "nodes")}
+    arrays = {"points": Array(breast_to_lps(MESH.points, laterality), "mm", "nodes")}
     write_artefact(found["mesh"], header("mesh", laterality), Fields(arrays=arrays, values={"n": MESH.n}))
     write_artefact(found["calibrate"], header("calibrate", "R"), Fields(values={"mu_kpa": mu_kpa}))
     return found

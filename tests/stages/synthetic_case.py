@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from mammoreg.geometry import ViewGeometry, Volume, lps_to_breast
+from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps
 from mammoreg.geometry.frames import Laterality, plate_rotation
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.meshing.block import BlockMesh
@@ -51,15 +51,15 @@ def write_segment(path: Path, laterality: Laterality, compressed: bool = False) 
         np.meshgrid(*(o + s * np.arange(k) for o, s, k in zip(origin, spacing, n, strict=True)), indexing="ij"), axis=-1
     )
     inside = (np.abs(grid[..., [0, 2]]) < HALF_WIDTH).all(-1) & (grid[..., 1] < 0) & (grid[..., 1] > -DEPTH)
-    mask = Volume(inside.astype(np.uint8), origin, spacing).between_lps_and_breast(laterality)
+    mask = Volume(inside.astype(np.uint8), origin, spacing).to_lps(laterality)
     side = np.linspace(-HALF_WIDTH, HALF_WIDTH, 31)
     wall = np.stack([*np.meshgrid(side, side, indexing="ij"), np.zeros((31, 31))], axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
     volumes = {"breast_mask": VolumeField(mask, "1", "breast")}
     if compressed:
         volumes["compressed_mask"] = VolumeField(_compressed_mask(laterality), "1", "body between the plates")
     arrays = {
-        "nipple": Array(lps_to_breast(np.array([0.0, -DEPTH, 0.0]), laterality), "mm", "nipple"),
-        "chest_wall_surface": Array(lps_to_breast(wall, laterality), "mm", "chest wall"),
+        "nipple": Array(breast_to_lps(np.array([0.0, -DEPTH, 0.0]), laterality), "mm", "nipple"),
+        "chest_wall_surface": Array(breast_to_lps(wall, laterality), "mm", "chest wall"),
     }
     write_artefact(path, header("segment", laterality), Fields(arrays=arrays, volumes=volumes))
     return path
@@ -75,12 +75,12 @@ def _compressed_mask(laterality: Laterality) -> Volume:
     back = compression("CC").inverse(grid @ plate_rotation(geometry("CC").angle_deg).T)
     body = (np.abs(back[:, [0, 2]]) < HALF_WIDTH).all(-1) & (back[:, 1] > -DEPTH) | (back[:, 1] > 0)
     data = body.reshape(len(axis), len(axis), len(axis)).astype(np.uint8)
-    return Volume(data, np.full(3, -90.0), np.full(3, 2.0)).between_lps_and_breast(laterality)
+    return Volume(data, np.full(3, -90.0), np.full(3, 2.0)).to_lps(laterality)
 
 
 def write_mesh(path: Path, laterality: Laterality) -> Path:
     block = box()
-    arrays = {"points": Array(lps_to_breast(block.points, laterality), "mm", "nodes")}
+    arrays = {"points": Array(breast_to_lps(block.points, laterality), "mm", "nodes")}
     write_artefact(path, header("mesh", laterality), Fields(arrays=arrays, values={"n": block.n}))
     return path
 

@@ -19,9 +19,9 @@ from stages.engine.errors import ArtefactError
 ATTRS = {"stage": "segment", "case": "c", "view": "", "laterality": "L", "artefact_id": "x"}
 
 
-def _volume(dtype=np.float32):
+def _volume(dtype=np.float32, frame="LPS"):
     data = np.arange(24).reshape(2, 3, 4).astype(dtype)
-    return Volume(data, np.array([1.1, -2.0, 30.3]), np.array([1.4, 1.0, 0.7]))
+    return Volume(data, np.array([1.1, -2.0, 30.3]), np.array([1.4, 1.0, 0.7]), frame)
 
 
 def _write(path, **contents):
@@ -44,8 +44,8 @@ def test_arrays_come_back_as_they_were(tmp_path_factory, data):
 
 @pytest.mark.parametrize("dtype", [np.float32, np.uint8, np.int16])
 def test_volume_comes_back_on_the_same_grid(tmp_path, dtype):
-    volume = _volume(dtype)
-    found = _write(tmp_path / "x.h5", volumes={"updated/mr": VolumeField(volume, "1", "MR", "plate")})
+    volume = _volume(dtype, "plate")
+    found = _write(tmp_path / "x.h5", volumes={"updated/mr": VolumeField(volume, "1", "MR")})
     assert found.volume_names() == ["updated/mr"]
     back = found.volume("updated/mr", "1", frame="plate")
     np.testing.assert_array_equal(back.data, volume.data)
@@ -100,7 +100,7 @@ def test_other_units_are_refused(tmp_path):
 
 
 def test_other_frame_is_refused(tmp_path):
-    found = _write(tmp_path / "x.h5", volumes={"mr": VolumeField(_volume(), "1", "MR", "plate")})
+    found = _write(tmp_path / "x.h5", volumes={"mr": VolumeField(_volume(frame="plate"), "1", "MR")})
     with pytest.raises(ArtefactError, match="volume mr is not in the LPS frame"):
         found.volume("mr")
 

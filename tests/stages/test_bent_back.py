@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry import breast_to_lps
 from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Array, Fields, write_artefact
 from tests.stages.pressed_case import EDGE, GAP, run, write_pose, write_start
@@ -26,7 +26,7 @@ def _bent():
 def chain(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bent")
     found = {"calibrate": write_start(folder)["calibrate"], "mesh": folder / "bent.h5"}
-    arrays = {"points": Array(lps_to_breast(_bent().points, "R"), "mm", "nodes")}
+    arrays = {"points": Array(breast_to_lps(_bent().points, "R"), "mm", "nodes")}
     write_artefact(found["mesh"], header("mesh", "R"), Fields(arrays=arrays, values={"n": _bent().n}))
     found["pose"] = write_pose(folder / "pose.h5")
     for stage, of in (("compress", ("calibrate", "mesh", "pose")), ("shape", ("mesh", "pose", "compress"))):

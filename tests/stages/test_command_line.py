@@ -1,5 +1,7 @@
 """`python -m stages`: check, show and export, and errors without a traceback."""
 
+from dataclasses import replace
+
 import nibabel
 import numpy as np
 import pytest
@@ -31,14 +33,15 @@ def artefact(tmp_path):
     grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), axis=-1).transpose(2, 1, 0, 3).reshape(-1, 3)
     block = BlockMesh(2, 10 * grid)
     volume = Volume(
-        np.arange(24, dtype=np.float32).reshape(2, 3, 4), np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 0.5])
+        np.arange(24, dtype=np.float32).reshape(2, 3, 4), np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 0.5]), "LPS"
     )
+    between = replace(volume, frame="plate")
     fields = Fields(
         arrays={
             "points": Array(block.points, "mm", "node positions"),
             "gland_fraction": Array(np.linspace(0, 1, 8), "1", "share of gland"),
         },
-        volumes={"mr": VolumeField(volume, "1", "MR signal"), "updated/mr": VolumeField(volume, "1", "MR", "plate")},
+        volumes={"mr": VolumeField(volume, "1", "MR signal"), "updated/mr": VolumeField(between, "1", "MR")},
         values={"rows": [{"name": "P1", "x_mm": 1.5}, {"name": "P2", "x_mm": None}], "n": 2},
     )
     path = tmp_path / "mesh.h5"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mammoreg.geometry import lps_to_breast, plate_to_breast
+from mammoreg.geometry import breast_to_lps, plate_to_breast
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
@@ -156,6 +156,6 @@ def test_a_lost_view_leaves_an_empty_two_view_row(tmp_path: Path) -> None:
 
 def test_names_must_agree_to_be_compared(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path)
-    other = write_tsv(tmp_path / "o.tsv", "name x y z diameter_mm", {"other": [*lps_to_breast(LESION, "R"), 8.0]})
+    other = write_tsv(tmp_path / "o.tsv", "name x y z diameter_mm", {"other": [*breast_to_lps(LESION, "R"), 8.0]})
     found = evaluated(tmp_path, inputs | view_marks(tmp_path, ("CC", "MLO"), (False, False)) | {"mr_lesion": other})
     assert found.value("table_5_rows") == found.value("table_6_rows") == []

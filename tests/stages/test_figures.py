@@ -10,7 +10,7 @@ import pytest
 import SimpleITK
 from PIL import Image
 
-from mammoreg.geometry import lps_to_breast, plate_to_breast
+from mammoreg.geometry import breast_to_lps, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Artefact
 from stages.figures.exports import stored_image
@@ -46,7 +46,7 @@ def read_picture(path: Path) -> np.ndarray:
 def between_plates(points: np.ndarray, laterality: Laterality) -> np.ndarray:
     """The synthetic truth: LPS points of the undeformed breast, carried between the plates of the CC, LPS."""
     placed = synthetic.compression("CC").forward(lps_to_breast(points, laterality))
-    return lps_to_breast(plate_to_breast(placed, synthetic.geometry("CC").angle_deg), laterality)
+    return breast_to_lps(plate_to_breast(placed, synthetic.geometry("CC").angle_deg), laterality)
 
 
 def test_all_pictures_are_drawn_and_listed(case: Case) -> None:
@@ -63,7 +63,7 @@ def test_the_predicted_lesion_on_the_mr_grid_lies_at_the_lesion(case: Case) -> N
     image = nibabel.load(path)
     assert image.shape == MR_SHAPE
     np.testing.assert_allclose(image.affine, MR_AFFINE, atol=1e-4)
-    expected = lps_to_breast(LESION, laterality)
+    expected = breast_to_lps(LESION, laterality)
     # One view sees the lesion along a beam; the other two directions are determined.
     assert np.abs(world_centroid(path) - expected)[:2].max() < 3.0
 
@@ -89,7 +89,7 @@ def test_itk_reads_the_displacement_in_lps(case: Case) -> None:
     folder, _, laterality = case
     image = SimpleITK.ReadImage(str(folder / "export" / "displacement_CC_updated.nii.gz"))
     assert image.GetNumberOfComponentsPerPixel() == 3
-    points = lps_to_breast(np.array([[-10.0, -40.0, 12.0], [20.0, -20.0, -8.0]]), laterality)
+    points = breast_to_lps(np.array([[-10.0, -40.0, 12.0], [20.0, -20.0, -8.0]]), laterality)
     for point in points:
         index = image.TransformPhysicalPointToIndex(point.tolist())
         voxel = np.array(image.TransformIndexToPhysicalPoint(index))

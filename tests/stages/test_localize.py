@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mammoreg.geometry import lps_to_breast, plate_to_breast
+from mammoreg.geometry import breast_to_lps, plate_to_breast
 from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Subject
@@ -26,8 +26,8 @@ def write_tsv(path: Path, columns: str, rows: dict[str, Any]) -> Path:
 
 
 def mr_marks(folder: Path, laterality: Laterality) -> dict[str, Path]:
-    lesion = {"mass": [*lps_to_breast(LESION, laterality), 10.0]}
-    points = {name: lps_to_breast(point, laterality) for name, point in POINTS.items()}
+    lesion = {"mass": [*breast_to_lps(LESION, laterality), 10.0]}
+    points = {name: breast_to_lps(point, laterality) for name, point in POINTS.items()}
     return {
         "mr_lesion": write_tsv(folder / "lesion.tsv", "name x y z diameter_mm", lesion),
         "mr_landmarks": write_tsv(folder / "landmarks.tsv", "name x y z", points),

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry import breast_to_lps
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import volumes
 from stages.compress.gland_map import gland_share
@@ -21,12 +21,12 @@ def write_segment(path, laterality, points=None):
     labels = mask.data.copy()
     labels[mask.to_world(np.indices(mask.shape).transpose(1, 2, 3, 0))[..., 2] > 0] *= 2
     volumes_ = {
-        "breast_mask": VolumeField(mask.between_lps_and_breast(laterality), "1", "breast"),
-        "labels": VolumeField(mask.with_data(labels).between_lps_and_breast(laterality), "1", "tissue"),
+        "breast_mask": VolumeField(mask.to_lps(laterality), "1", "breast"),
+        "labels": VolumeField(mask.with_data(labels).to_lps(laterality), "1", "tissue"),
     }
     arrays = {
-        "chest_wall_surface": Array(lps_to_breast(back if points is None else points, laterality), "mm", "back"),
-        "nipple": Array(lps_to_breast(nipple, laterality), "mm", "nipple"),
+        "chest_wall_surface": Array(breast_to_lps(back if points is None else points, laterality), "mm", "back"),
+        "nipple": Array(breast_to_lps(nipple, laterality), "mm", "nipple"),
     }
     header = {"stage": "segment", "case": "c", "view": "", "laterality": laterality, "artefact_id": "s", "status": "ok"}
     write_artefact(path, header, Fields(arrays=arrays, volumes=volumes_))

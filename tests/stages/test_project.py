@@ -32,10 +32,10 @@ STEP = 3
 def _segment(path: Path, laterality):
     """Replace the segmentation by one with labels (fat around a ball of gland) and an MR volume."""
     old = Artefact(path)
-    mask = old.volume("breast_mask").between_lps_and_breast(laterality)
+    mask = old.volume("breast_mask").to_breast(laterality)
     where = np.stack(np.meshgrid(*(np.arange(size) for size in mask.shape), indexing="ij"), axis=-1)
     gland = np.linalg.norm(mask.to_world(where) - GLAND, axis=-1) < 9.0
-    labels = mask.with_data((mask.data * np.where(gland, 2, 1)).astype(np.uint8)).between_lps_and_breast(laterality)
+    labels = mask.with_data((mask.data * np.where(gland, 2, 1)).astype(np.uint8)).to_lps(laterality)
     mr = labels.with_data(np.where(labels.data == 2, 300.0, 900.0 * (labels.data > 0)).astype(np.float32))
     volumes = {
         "breast_mask": VolumeField(old.volume("breast_mask"), "1", "breast"),

@@ -1,5 +1,6 @@
 """Stage `segment` from files to fields."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -33,11 +34,11 @@ def segment(files: dict[str, Path], side: Literal["L", "R"] = "R", settings: Set
 
 def test_a_mirrored_patient_gives_mirrored_results(tmp_path: Path) -> None:
     patient = torso()
-    mirror = patient.between_lps_and_breast("L")
+    mirror = replace(patient, frame="breast").to_lps("L")
     right = segment({"mr": write(patient, tmp_path / "r.nii")})
     left = segment({"mr": write(mirror, tmp_path / "l.nii")}, "L")
     for name in ("mr", "labels", "breast_mask"):
-        one, other = right.volumes[name].volume, left.volumes[name].volume.between_lps_and_breast("L")
+        one, other = right.volumes[name].volume, left.volumes[name].volume.to_breast("L")
         assert np.array_equal(one.data, other.data)
         assert np.allclose(one.origin, other.origin, atol=1e-9)
     for name in ("nipple", "chest_wall_surface"):

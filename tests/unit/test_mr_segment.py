@@ -82,7 +82,7 @@ def test_mask_is_one_piece_and_labels_cover_it(right: tuple[Segmentation, bool])
 
 
 def test_side_decides_between_two_breasts() -> None:
-    found = segment_volume(torso().between_lps_and_breast("L"), None, SETTINGS, no_bias)
+    found = segment_volume(torso().to_breast("L"), None, SETTINGS, no_bias)
     tip = LEFT.nipple_point() * np.array([-1.0, 1.0, 1.0])
     assert np.hypot(*(found.nipple - tip)[[0, 2]]) < 4.0
 

@@ -75,6 +75,5 @@ def torso(
     signal = np.where(chest > 30.0, 25.0, signal)
     random = np.random.default_rng(7)
     real = signal * (1.0 + 0.001 * z) + noise * random.standard_normal(signal.shape)
-    return Volume(
-        np.hypot(real, noise * random.standard_normal(signal.shape)).astype(np.float32), lower, np.full(3, spacing)
-    )
+    magnitude = np.hypot(real, noise * random.standard_normal(signal.shape)).astype(np.float32)
+    return Volume(magnitude, lower, np.full(3, spacing), "LPS")

@@ -10,8 +10,8 @@ Three frames are used, all in mm:
   height towards the source).
 """
 
-from mammoreg.geometry.frames import breast_to_plate, lps_to_breast, plate_to_breast
+from mammoreg.geometry.frames import breast_to_lps, breast_to_plate, lps_to_breast, plate_to_breast
 from mammoreg.geometry.view import ViewGeometry
 from mammoreg.geometry.volume import Volume
 
-__all__ = ["ViewGeometry", "Volume", "breast_to_plate", "lps_to_breast", "plate_to_breast"]
+__all__ = ["ViewGeometry", "Volume", "breast_to_lps", "breast_to_plate", "lps_to_breast", "plate_to_breast"]

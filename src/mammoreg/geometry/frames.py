@@ -6,11 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 Laterality = Literal["L", "R"]
+Frame = Literal["LPS", "breast", "plate"]
 Points = NDArray[np.float64]
 
 
 def lps_to_breast(points: Points, laterality: Laterality) -> Points:
-    """Map points (..., 3) in mm between LPS and the breast frame; the map is its own inverse."""
+    """Carry points (..., 3) in mm from LPS to the breast frame."""
+    return _mirrored(points, laterality)
+
+
+def breast_to_lps(points: Points, laterality: Laterality) -> Points:
+    """Carry points (..., 3) in mm from the breast frame to LPS."""
+    return _mirrored(points, laterality)
+
+
+def _mirrored(points: Points, laterality: Laterality) -> Points:
+    """Points mirrored in x for a left breast; the map is its own inverse."""
     mirrored = np.array(points, dtype=float, copy=True)
     if laterality == "L":
         mirrored[..., 0] *= -1.0
@@ -20,8 +31,8 @@ def lps_to_breast(points: Points, laterality: Laterality) -> Points:
 def plate_rotation(angle_deg: float) -> NDArray[np.float64]:
     """Rotation (3, 3) from the breast to the plate frame at a projection angle in degrees.
 
-    Its rows are the plate axes in breast coordinates; the last one points from the breast to the source (contract,
-    Geometry: (-s sin a, 0, cos a) in LPS).
+    Its rows are the plate axes in breast coordinates; the last one points from the breast to the source, in LPS
+    (-s sin a, 0, cos a) with s = +1 for a left and -1 for a right breast.
     """
     a = np.deg2rad(angle_deg)
     return np.array([[np.cos(a), 0.0, -np.sin(a)], [0.0, 1.0, 0.0], [np.sin(a), 0.0, np.cos(a)]])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Frame, Laterality, Points
 
 
 @dataclass(frozen=True)
@@ -18,11 +18,13 @@ class Volume:
         data: samples, shape (nx, ny, nz).
         origin: centre of voxel (0, 0, 0), shape (3,), mm.
         spacing: distance of voxel centres, shape (3,), mm, all positive.
+        frame: in which origin and axes are.
     """
 
     data: NDArray[Any]
     origin: NDArray[np.float64]
     spacing: NDArray[np.float64]
+    frame: Frame = "breast"
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -61,10 +63,28 @@ class Volume:
             raise ValueError(f"samples of shape {data.shape} do not fit a grid of shape {self.data.shape}")
         return replace(self, data=data)
 
-    def between_lps_and_breast(self, laterality: Laterality) -> "Volume":
-        """The same volume in the other of the LPS and breast frames: mirrored in x for a left breast."""
+    def to_breast(self, laterality: Laterality) -> "Volume":
+        """The same LPS volume in the breast frame.
+
+        Raises:
+            ValueError: it is in another frame.
+        """
+        return self._mirrored("LPS", "breast", laterality)
+
+    def to_lps(self, laterality: Laterality) -> "Volume":
+        """The same volume of the breast frame in LPS.
+
+        Raises:
+            ValueError: it is in another frame.
+        """
+        return self._mirrored("breast", "LPS", laterality)
+
+    def _mirrored(self, start: Frame, end: Frame, laterality: Laterality) -> "Volume":
+        """In the other of LPS and breast frame: mirrored in x for a left breast."""
+        if self.frame != start:
+            raise ValueError(f"a volume of the {self.frame} frame is not one of the {start} frame")
         if laterality == "R":
-            return self
+            return replace(self, frame=end)
         origin = self.origin.copy()
         origin[0] = -(self.origin[0] + (self.shape[0] - 1) * self.spacing[0])
-        return Volume(np.ascontiguousarray(self.data[::-1]), origin, self.spacing)
+        return Volume(np.ascontiguousarray(self.data[::-1]), origin, self.spacing, end)

@@ -18,7 +18,7 @@ def block_mean(volume: Volume, target_mm: float) -> Volume:
     shape = [n for pair in zip(counts, factors, strict=True) for n in pair]
     means = trimmed.reshape(shape).mean(axis=(1, 3, 5), dtype=np.float32)
     origin = volume.origin + 0.5 * (factors - 1) * volume.spacing
-    return Volume(means, origin, volume.spacing * factors)
+    return Volume(means, origin, volume.spacing * factors, volume.frame)
 
 
 def working_volume(volume: Volume, box: Box, spacing_mm: float) -> Volume:
@@ -40,7 +40,7 @@ def working_volume(volume: Volume, box: Box, spacing_mm: float) -> Volume:
     data = ndimage.affine_transform(
         smooth, ratio, offset=index, output_shape=tuple(last - first + 1), order=1, mode="nearest"
     )
-    return Volume(data.astype(np.float32), origin, np.full(3, spacing_mm))
+    return Volume(data.astype(np.float32), origin, np.full(3, spacing_mm), volume.frame)
 
 
 def nearest_labels(labels: Volume, grid: Volume) -> NDArray[np.uint8]:
@@ -57,4 +57,4 @@ def _part(volume: Volume, lower: NDArray[np.float64], upper: NDArray[np.float64]
     start = np.clip(np.floor(volume.to_index(lower)).astype(int) - 2, 0, None)
     stop = np.minimum(np.ceil(volume.to_index(upper)).astype(int) + 3, volume.shape)
     data = volume.data[tuple(slice(a, b) for a, b in zip(start, stop, strict=True))]
-    return Volume(data, volume.to_world(start), volume.spacing)
+    return Volume(data, volume.to_world(start), volume.spacing, volume.frame)

@@ -150,4 +150,6 @@ def _box_around(breast: Mask, margin: int) -> tuple[slice, ...]:
 
 def _crop(grid: Volume, box: tuple[slice, ...]) -> Volume:
     """The part of a volume inside slices."""
-    return Volume(np.ascontiguousarray(grid.data[box]), grid.to_world(np.array([s.start for s in box])), grid.spacing)
+    return Volume(
+        np.ascontiguousarray(grid.data[box]), grid.to_world(np.array([s.start for s in box])), grid.spacing, grid.frame
+    )

@@ -43,9 +43,9 @@ class MaskLesion:
         """Volume of the mask's voxels."""
         return float(np.count_nonzero(self.mask.data)) * self.mask.voxel_mm3
 
-    def between_lps_and_breast(self, laterality: Laterality) -> "MaskLesion":
+    def to_breast(self, laterality: Laterality) -> "MaskLesion":
         """The lesion in the other of the two frames."""
-        return MaskLesion(self.mask.between_lps_and_breast(laterality))
+        return MaskLesion(self.mask.to_breast(laterality))
 
     def body(self) -> LesionBody:
         """Points that fill the mask."""
@@ -71,7 +71,7 @@ class SphereLesion:
         """Volume of the sphere."""
         return float(np.pi / 6.0 * self.diameter_mm**3)
 
-    def between_lps_and_breast(self, laterality: Laterality) -> "SphereLesion":
+    def to_breast(self, laterality: Laterality) -> "SphereLesion":
         """The lesion in the other of the two frames."""
         return SphereLesion(lps_to_breast(self.centre, laterality), self.diameter_mm)
 
@@ -147,7 +147,7 @@ def body_from_mask(mask: Volume) -> LesionBody:
     axes = [(np.arange(n * k) + 0.5) / k - 0.5 for n, k in zip(part.shape, parts, strict=True)]
     index = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     origin = mask.to_world(low)
-    crop = Volume(part.astype(np.float32), origin, mask.spacing)
+    crop = Volume(part.astype(np.float32), origin, mask.spacing, mask.frame)
     points = crop.to_world(index)
     points = points[crop.sample(points) >= 0.5]
     return LesionBody(points, float(np.max(mask.spacing / parts)), mask.centres(selected).mean(axis=0))

@@ -181,4 +181,4 @@ def _volume_of(grid: BreastGrid, cells: Cells, level: int) -> Volume:
     low = cells.min(axis=0)
     data = np.zeros(tuple(cells.max(axis=0) - low + 1), dtype=bool)
     data[tuple((cells - low).T)] = True
-    return Volume(data, grid.centres(low, level), grid.spacing(level))
+    return Volume(data, grid.centres(low, level), grid.spacing(level), grid.breast.frame)

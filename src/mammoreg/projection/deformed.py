@@ -35,7 +35,7 @@ class PlateGrid:
 
     def volume(self, samples: NDArray[np.float32]) -> Volume:
         """Samples of this grid as a volume."""
-        return Volume(samples, self.origin, np.full(3, self.spacing_mm))
+        return Volume(samples, self.origin, np.full(3, self.spacing_mm), "plate")
 
 
 def grid_around(points: Points, spacing_mm: float, margin_mm: float = _SHELL_MM) -> PlateGrid:

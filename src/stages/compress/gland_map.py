@@ -22,7 +22,7 @@ def gland_share(inputs: Inputs) -> NDArray[np.float64]:
     if not inputs.has("segment"):
         raise UserError("a material that tells gland from fat needs the input segment; give it with --in segment=path")
     segment = inputs.artefact("segment")
-    labels = segment.volume("labels").between_lps_and_breast(segment.laterality)
+    labels = segment.volume("labels").to_breast(segment.laterality)
     return tissue_fraction(block_mesh(inputs.artefact("mesh")), labels, _GLAND, (_FAT, _GLAND, _SKIN))
 
 

@@ -32,7 +32,7 @@ ORIENTATION = {
 
 def nifti(volume: Volume, laterality: Laterality, sagittal: bool = False) -> bytes:
     """A breast-frame volume as compressed NIfTI, its planes axial or sagittal."""
-    lps = volume.between_lps_and_breast(laterality)
+    lps = volume.to_lps(laterality)
     affine = np.diag([*(lps.spacing * np.array([-1.0, -1.0, 1.0])), 1.0])
     affine[:3, 3] = lps.origin * np.array([-1.0, -1.0, 1.0])
     data = np.asarray(lps.data)
@@ -45,7 +45,7 @@ def nifti(volume: Volume, laterality: Laterality, sagittal: bool = False) -> byt
 
 def mr_dicom(volume: Volume, subject: Subject) -> list[bytes]:
     """A breast-frame volume as one DICOM series of axial slices, from inferior to superior."""
-    lps = volume.between_lps_and_breast(subject.laterality)
+    lps = volume.to_lps(subject.laterality)
     data = np.asarray(lps.data)
     return [_mr_slice(lps, data[:, :, k], k, subject) for k in range(data.shape[2])]
 

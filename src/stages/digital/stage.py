@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate, lps_to_breast
+from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, breast_to_plate
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.mammogram import Exposure, Pectoral, presented, project
 from mammoreg.phantom.mri import T1, T1_FAT_SUPPRESSED, Acquisition, acquire
@@ -162,10 +162,10 @@ class Making:
         self.files[name] = points_tsv(names, pixel[shown], ("column", "row"))
 
     def _points_file(self, name: str, names: list[str], points: Points) -> None:
-        self.files[name] = points_tsv(names, lps_to_breast(points, self.subject.laterality), ("x", "y", "z"))
+        self.files[name] = points_tsv(names, breast_to_lps(points, self.subject.laterality), ("x", "y", "z"))
 
     def _note(self, name: str, points: Points, units: str, meaning: str) -> None:
-        self.arrays[name] = Array(lps_to_breast(points, self.subject.laterality), units, f"{meaning} (LPS)")
+        self.arrays[name] = Array(breast_to_lps(points, self.subject.laterality), units, f"{meaning} (LPS)")
 
     def _note_press(self, view: View, pressed: Pressed, deformed: Deformed, middle_mm: float | None) -> None:
         """Truth about a compression."""

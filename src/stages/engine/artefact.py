@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.geometry import Volume
+from mammoreg.geometry.frames import Frame
 from stages.engine.errors import ArtefactError
 
 Status = Literal["ok", "not_converged", "failed"]
-Frame = Literal["LPS", "plate"]
 Value = None | bool | int | float | str | list[Any] | dict[str, Any]
 
 AXIS_NAMES = {
@@ -40,12 +40,19 @@ class Array:
 
 @dataclass(frozen=True)
 class VolumeField:
-    """A volume with the units of its samples, what it is and the frame of its grid."""
+    """A volume with the units of its samples and what it is.
+
+    Raises:
+        ValueError: it is in the breast frame, which no artefact holds.
+    """
 
     volume: Volume
     units: str
     long_name: str
-    frame: Frame = "LPS"
+
+    def __post_init__(self) -> None:
+        if self.volume.frame not in AXIS_NAMES:
+            raise ValueError(f"artefacts hold no volume of the {self.volume.frame} frame; take it to LPS first")
 
 
 @dataclass(frozen=True)
@@ -143,7 +150,7 @@ class Artefact:
                 self._check_units(name, _text(node.attrs["units"]), units)
             if _text(node.attrs["frame"]) != frame:
                 raise ArtefactError(f"{self.path}: volume {name} is not in the {frame} frame")
-            return Volume(node[()], np.array(node.attrs["origin_mm"]), np.array(node.attrs["spacing_mm"]))
+            return Volume(node[()], np.array(node.attrs["origin_mm"]), np.array(node.attrs["spacing_mm"]), frame)
 
     def _missing(self, kind: str, name: str, names: list[str]) -> ArtefactError:
         return ArtefactError(f"{self.path}: no {kind} {name!r} in this artefact; it has {', '.join(names) or 'none'}")
@@ -221,17 +228,17 @@ def _write_volume(parent: Any, name: str, field_: VolumeField) -> None:
     # Raw floats hardly shrink and cost seconds; labels shrink a hundredfold.
     compression = "gzip" if data.dtype.kind in "ui" else None
     node = group.create_dataset(short, data=data, compression=compression)
-    texts = {"units": field_.units, "long_name": field_.long_name, "frame": field_.frame}
+    texts = {"units": field_.units, "long_name": field_.long_name, "frame": volume.frame}
     for key, text in texts.items():
         _set_text(node, key, text)
     node.attrs["origin_mm"] = np.asarray(volume.origin, dtype=float)
     node.attrs["spacing_mm"] = np.asarray(volume.spacing, dtype=float)
-    for axis, (letter, meaning) in enumerate(AXIS_NAMES[field_.frame].items()):
+    for axis, (letter, meaning) in enumerate(AXIS_NAMES[volume.frame].items()):
         positions = volume.origin[axis] + volume.spacing[axis] * np.arange(data.shape[axis])
         scale = group.create_dataset(letter, data=positions)
         scale.make_scale(letter)
         _set_text(scale, "units", "mm")
-        _set_text(scale, "long_name", f"{field_.frame} {letter}, {meaning}")
+        _set_text(scale, "long_name", f"{volume.frame} {letter}, {meaning}")
         node.dims[axis].attach_scale(scale)
 
 

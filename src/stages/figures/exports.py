@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.geometry import Volume, lps_to_breast, plate_to_breast
+from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality, Points, plate_rotation
 from mammoreg.meshing.block import BlockMesh
 from stages.compress.gland_map import GLAND_SHARE, kept_gland_share
@@ -100,7 +100,7 @@ def _carried(case: PicturedCase, view: str, method: str, points: Points) -> Poin
     """Points (N, 3) of the undeformed breast between the plates of a view, both LPS mm."""
     way = case.methods[view][method]
     placed = way.deformation.forward(lps_to_breast(points, case.laterality))
-    return lps_to_breast(plate_to_breast(placed, way.geometry.angle_deg), case.laterality)
+    return breast_to_lps(plate_to_breast(placed, way.geometry.angle_deg), case.laterality)
 
 
 def _undeformed_mesh(case: PicturedCase, block: BlockMesh) -> bytes:
@@ -108,12 +108,12 @@ def _undeformed_mesh(case: PicturedCase, block: BlockMesh) -> bytes:
     compress = case.ok("compress")
     gland = kept_gland_share(compress) if compress is not None else None
     shares = {} if gland is None else {GLAND_SHARE: [gland]}
-    return vtu_bytes(lps_to_breast(block.points, case.laterality), lps_hexes(block, case.laterality), {}, shares)
+    return vtu_bytes(breast_to_lps(block.points, case.laterality), lps_hexes(block, case.laterality), {}, shares)
 
 
 def _deformed_mesh(case: PicturedCase, block: BlockMesh, view: str, method: str) -> bytes:
     """The deformed mesh, LPS, with the displacement of its nodes."""
-    points = lps_to_breast(block.points, case.laterality)
+    points = breast_to_lps(block.points, case.laterality)
     carried = _carried(case, view, method, points)
     return vtu_bytes(carried, lps_hexes(block, case.laterality), {"displacement_mm": carried - points}, {})
 

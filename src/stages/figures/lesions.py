@@ -49,4 +49,4 @@ def lesion_mask(lesion: MrLesion) -> Volume:
     steps = np.arange(-half, half + _SPHERE_STEP_MM, _SPHERE_STEP_MM)
     grid = np.stack(np.meshgrid(steps, steps, steps, indexing="ij"), axis=-1)
     inside = np.linalg.norm(grid, axis=-1) <= 0.5 * lesion.diameter_mm
-    return Volume(inside, np.asarray(lesion.centre) + steps[0], np.full(3, _SPHERE_STEP_MM))
+    return Volume(inside, np.asarray(lesion.centre) + steps[0], np.full(3, _SPHERE_STEP_MM), "LPS")

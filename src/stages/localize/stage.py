@@ -44,7 +44,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
 def _to_mammograms(inputs: Inputs, views: CaseViews, laterality: Laterality) -> Fields:
     """Reads `mr_lesion` and `mr_landmarks` alone."""
     lesions = mr_lesions(inputs).items()
-    bodies = {name: lesion.between_lps_and_breast(laterality).body() for name, lesion in lesions}
+    bodies = {name: lesion.to_breast(laterality).body() for name, lesion in lesions}
     return predict_in_mammograms(views, bodies, _landmarks(inputs, laterality))
 
 
@@ -53,7 +53,7 @@ def _to_mr(inputs: Inputs, views: CaseViews, segment: Artefact, skin: Points) ->
     side = segment.laterality
     anatomy = Anatomy(
         side,
-        segment.volume("breast_mask").between_lps_and_breast(side),
+        segment.volume("breast_mask").to_breast(side),
         lps_to_breast(segment.array("nipple", "mm"), side),
         skin,
         lps_to_breast(segment.array("chest_wall_surface", "mm"), side),

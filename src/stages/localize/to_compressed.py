@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry import breast_to_lps
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.to_compressed import SecondVolume
 from mammoreg.meshing.block import BlockMesh
@@ -20,7 +20,7 @@ def second_volume(segment: Artefact, block: BlockMesh) -> SecondVolume | None:
     """The second volume of a case, None without one."""
     if "compressed_mask" not in segment.volume_names():
         return None
-    mask = segment.volume("compressed_mask").between_lps_and_breast(segment.laterality)
+    mask = segment.volume("compressed_mask").to_breast(segment.laterality)
     return SecondVolume(mask, block.skin_points(_SKIN_PARTS))
 
 
@@ -59,7 +59,7 @@ def predict_in_compressed(
             carried = second.place(views.methods[view][method], drawn_mm(views.poses[view]), points)
         else:
             carried = np.full(points.shape, np.nan)
-        rows += _rows(method, list(landmarks), lps_to_breast(carried, laterality))
+        rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality))
     return Fields(values={"compressed_rows": rows})
 
 

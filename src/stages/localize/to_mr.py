@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from mammoreg.geometry import Volume, lps_to_breast
+from mammoreg.geometry import Volume, breast_to_lps
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.anatomy import clock_position, distance_to
 from mammoreg.localization.grid import BreastGrid, BreastInView
@@ -79,7 +79,7 @@ def _row(method: str, name: str, found: MrPrediction, anatomy: Anatomy, lost: li
     point = found.point
     message = "; ".join(text for text in (found.message, *lost) if text)
     row = _line(method, name, "+".join(found.curves), message)
-    row |= dict(zip("xyz", lps_to_breast(point, anatomy.laterality).tolist(), strict=True))
+    row |= dict(zip("xyz", breast_to_lps(point, anatomy.laterality).tolist(), strict=True))
     return row | {
         "beam_gap_mm": found.beam_gap_mm,
         "nipple_distance_mm": float(np.linalg.norm(point - anatomy.nipple)),
@@ -98,7 +98,7 @@ def _line(method: str, name: str, views: str, message: str) -> dict[str, Any]:
 
 def _curves(key: str, found: MrPrediction, laterality: Laterality) -> dict[str, Array]:
     return {
-        f"{key}/curve_{view}": Array(lps_to_breast(curve, laterality), "mm", f"beam of {view} in the undeformed breast")
+        f"{key}/curve_{view}": Array(breast_to_lps(curve, laterality), "mm", f"beam of {view} in the undeformed breast")
         for view, curve in found.curves.items()
     }
 
@@ -106,5 +106,5 @@ def _curves(key: str, found: MrPrediction, laterality: Laterality) -> dict[str, 
 def _region(key: str, found: MrPrediction, laterality: Laterality) -> dict[str, VolumeField]:
     if found.region is None:
         return {}
-    region = found.region.with_data(found.region.data.astype(np.uint8)).between_lps_and_breast(laterality)
+    region = found.region.with_data(found.region.data.astype(np.uint8)).to_lps(laterality)
     return {f"{key}/region": VolumeField(region, "1", "predicted lesion in the undeformed breast")}

@@ -3,7 +3,7 @@
 import numpy as np
 from pydantic import Field
 
-from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry import breast_to_lps, lps_to_breast
 from mammoreg.meshing.breast import BreastMesh, build_mesh
 from mammoreg.meshing.quality import MeshQuality
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
@@ -25,12 +25,12 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Mesh the segmented breast."""
     side = subject.laterality
     segment = inputs.artefact("segment")
-    mask = segment.volume("breast_mask").between_lps_and_breast(side)
+    mask = segment.volume("breast_mask").to_breast(side)
     back, nipple = (lps_to_breast(segment.array(name, "mm"), side) for name in ("chest_wall_surface", "nipple"))
     built = build_mesh(mask, back, nipple, settings.elements)
     hexes = built.mesh.hexes()
     arrays = {
-        "points": Array(lps_to_breast(built.mesh.points, side), "mm", "nodes of the block, first axis to medial"),
+        "points": Array(breast_to_lps(built.mesh.points, side), "mm", "nodes of the block, first axis to medial"),
         "hexes": Array(hexes[:, _MIRRORED_ORDER] if side == "L" else hexes, "1", "nodes of each hexahedron, VTK order"),
     }
     return Fields(arrays=arrays, values=_values(built, settings))

@@ -14,9 +14,7 @@ BLOCK_MM = 2.8  # a tissue point stands for a block of about this side; wider ga
 
 def coarse_tissue(segment: Artefact, mesh: BlockMesh) -> DenseTissue:
     """Share of gland in blocks of breast voxels."""
-    labels, breast = (
-        segment.volume(name).between_lps_and_breast(segment.laterality) for name in ("labels", "breast_mask")
-    )
+    labels, breast = (segment.volume(name).to_breast(segment.laterality) for name in ("labels", "breast_mask"))
     gland, inside = (_blocks(v) for v in (labels.with_data(labels.data == GLAND), breast.with_data(breast.data > 0)))
     kept = inside.data > 0.5
     element, local, _ = Locator(mesh.points, mesh.hexes()).locate(inside.centres(kept))
@@ -30,4 +28,4 @@ def _blocks(volume: Volume) -> Volume:
     crop = volume.data[: nx * bx, : ny * by, : nz * bz].astype(float)
     means = crop.reshape(nx, bx, ny, by, nz, bz).mean(axis=(1, 3, 5))
     block = np.array([bx, by, bz])
-    return Volume(means, volume.origin + 0.5 * (block - 1) * volume.spacing, volume.spacing * block)
+    return Volume(means, volume.origin + 0.5 * (block - 1) * volume.spacing, volume.spacing * block, volume.frame)

@@ -44,7 +44,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     if image is not None:
         seen = see_mammogram(image, subject, "MLO" if subject.view == "MLO" else "CC")
     elif segment.has("compressed_mask"):
-        seen = see_second_volume(segment.volume("compressed_mask").between_lps_and_breast(subject.laterality))
+        seen = see_second_volume(segment.volume("compressed_mask").to_breast(subject.laterality))
     else:
         return without_image(mesh, subject)
     nipple = lps_to_breast(segment.array("nipple", "mm"), subject.laterality)

@@ -26,7 +26,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         if not artefact.ok:
             return Fields(status=artefact.status, message=artefact.message)
     labels, breast_mask, mr = (
-        segment.volume(name).between_lps_and_breast(segment.laterality) for name in ("labels", "breast_mask", "mr")
+        segment.volume(name).to_breast(segment.laterality) for name in ("labels", "breast_mask", "mr")
     )
     tissue, reference = tissue_of_labels(labels, breast_mask), reference_mesh(mesh)
     step = max(1, round(settings.detector_mm / float(pose.value("pixel_mm"))))
@@ -42,7 +42,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             shown, outlined = pose.array("mammogram", "1"), pose.array("breast_mask", "1")
             values[f"{name}_ncc"] = projection_correlation(image, mask, shown, outlined, step)
         if name in MESH_METHODS:
-            volumes[f"{name}/mr"] = VolumeField(breast.carry(mr), "1", f"MR volume, method {name}", "plate")
+            volumes[f"{name}/mr"] = VolumeField(breast.carry(mr), "1", f"MR volume, method {name}")
     failed = next((artefact for artefact in solutions if not artefact.ok), None)
     status, message = (failed.status, failed.message) if failed else ("ok", "")
     return Fields(arrays=arrays, volumes=volumes, values=values, status=status, message=message)

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import Volume, lps_to_breast
+from mammoreg.geometry import Volume, breast_to_lps
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
@@ -38,13 +38,13 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     if labels is not None and not _same_grid(mr, labels):
         raise DataError("mr_labels lies on another grid than mr; resample it onto the MR grid")
     choices = SegmentSettings(settings.spacing_mm, _back_settings(settings))
-    breast_labels = None if labels is None else labels.between_lps_and_breast(side)
-    found = segment_volume(mr.between_lps_and_breast(side), breast_labels, choices, n4_field)
+    breast_labels = None if labels is None else labels.to_breast(side)
+    found = segment_volume(mr.to_breast(side), breast_labels, choices, n4_field)
     fields = _fields(found, side)
     if compressed_path is None:
         return fields
-    mask = segment_body(read_mr(compressed_path).between_lps_and_breast(side), settings.spacing_mm)
-    volume = VolumeField(mask.between_lps_and_breast(side), "1", "body in the compressed volume, chest included")
+    mask = segment_body(read_mr(compressed_path).to_breast(side), settings.spacing_mm)
+    volume = VolumeField(mask.to_lps(side), "1", "body in the compressed volume, chest included")
     return replace(fields, volumes={**fields.volumes, "compressed_mask": volume})
 
 
@@ -66,21 +66,21 @@ def _same_grid(one: Volume, other: Volume) -> bool:
 def _fields(found: Segmentation, side: Laterality) -> Fields:
     grid = found.mr
     volumes = {
-        "mr": VolumeField(grid.between_lps_and_breast(side), "1", "MR intensity, bias-corrected"),
+        "mr": VolumeField(grid.to_lps(side), "1", "MR intensity, bias-corrected"),
         "labels": VolumeField(
-            grid.with_data(found.labels).between_lps_and_breast(side),
+            grid.with_data(found.labels).to_lps(side),
             "1",
             "tissue: 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall",
         ),
         "breast_mask": VolumeField(
-            grid.with_data(found.breast.astype(np.uint8)).between_lps_and_breast(side),
+            grid.with_data(found.breast.astype(np.uint8)).to_lps(side),
             "1",
             "breast in front of the chest-wall surface",
         ),
     }
     arrays = {
-        "chest_wall_surface": Array(lps_to_breast(found.back, side), "mm", "points on the back surface of the breast"),
-        "nipple": Array(lps_to_breast(found.nipple, side), "mm", "nipple in the MR volume"),
+        "chest_wall_surface": Array(breast_to_lps(found.back, side), "mm", "points on the back surface of the breast"),
+        "nipple": Array(breast_to_lps(found.nipple, side), "mm", "nipple in the MR volume"),
     }
     values: dict[str, Value] = {
         "fat_suppressed": found.fat_suppressed,

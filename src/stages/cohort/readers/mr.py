@@ -61,7 +61,7 @@ def lps_volume(data: NDArray[Any], affine: NDArray[np.float64], order: Literal[0
     flipped = data[tuple(slice(None, None, int(sign)) for sign in signs)]
     start = affine[:3, 3] + affine[:3, :3] @ np.where(signs < 0, np.array(data.shape) - 1, 0)
     back = np.argsort(axes)
-    return Volume(np.ascontiguousarray(flipped.transpose(back)), start, spacing[back])
+    return Volume(np.ascontiguousarray(flipped.transpose(back)), start, spacing[back], "LPS")
 
 
 def _nearest_axes(cosines: NDArray[np.float64]) -> NDArray[np.intp]:
@@ -85,7 +85,7 @@ def _resampled(
     inverse = np.linalg.inv(affine[:3, :3])
     offset = inverse @ (origin - affine[:3, 3])
     found = ndimage.affine_transform(data, inverse * spacing, offset=offset.tolist(), output_shape=shape, order=order)
-    return Volume(np.asarray(found), origin, spacing)
+    return Volume(np.asarray(found), origin, spacing, "LPS")
 
 
 def _nifti_voxels(path: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:

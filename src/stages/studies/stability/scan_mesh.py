@@ -1,7 +1,7 @@
 """The breast of the scan that the key `stability_scan` names, meshed for the stability study."""
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import lps_to_breast
+from mammoreg.geometry import breast_to_lps, lps_to_breast
 from mammoreg.geometry.frames import Laterality
 from mammoreg.meshing.breast import build_mesh
 from mammoreg.scenes.scenario import LEVELS
@@ -16,11 +16,11 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Segment the right breast, or the left one where the scan shows no right one, and mesh it at every size."""
     side, found = _segmented(inputs)
-    mask = found.volumes["breast_mask"].volume.between_lps_and_breast(side)
+    mask = found.volumes["breast_mask"].volume.to_breast(side)
     back, nipple = (lps_to_breast(found.arrays[name].data, side) for name in ("chest_wall_surface", "nipple"))
     meshes = {n: build_mesh(mask, back, nipple, n).mesh for n in LEVELS["elements"]}
     arrays = {
-        f"points/{n}": Array(lps_to_breast(mesh.points, side), "mm", f"nodes of the block of {n} elements a side")
+        f"points/{n}": Array(breast_to_lps(mesh.points, side), "mm", f"nodes of the block of {n} elements a side")
         for n, mesh in meshes.items()
     }
     return Fields(arrays=arrays, values={"laterality": side})
