@@ -43,6 +43,7 @@ def row(name: str, **values: Any) -> dict[str, Any]:
         "force_n": 10.0,
         "width_mm": 150.0,
         "depth_mm": 60.0,
+        "penetration_mm": 0.4,
         "wall_s": 1.0,
         "message": "",
         "checks": [{"name": "unbalanced force", "value": 1e-6, "limit": 1e-3}],
@@ -104,6 +105,12 @@ def test_unknown_names_are_an_error(tmp_path: Path) -> None:
     fields = run_stage("stability_batch", {}, tmp_path / "b.h5", {"only": ["corner-99"]}, subject)
     assert fields.status == "failed"
     assert "corner-99" in fields.message
+
+
+def test_page_says_that_a_limit_was_moved_and_what_it_would_have_cost() -> None:
+    said = "\n".join(summary([row("fine"), row("deep", penetration_mm=2.4)])[0])
+    assert "moved after the first runs, from 2 mm to 5 % of the gap" in said
+    assert "1 of 2 answers would fail: deep." in said
 
 
 def test_study_is_met_only_if_nearly_all_converge_and_none_is_wrong() -> None:

@@ -48,7 +48,21 @@ def test_thickness_is_recovered_within_the_aim(share: float) -> None:
     found = estimate_thickness(
         VIEW, outline_of(points, facets, share), lambda view: pressed(points, view), facets, HEIGHT
     )
-    assert found == pytest.approx(share * HEIGHT, rel=0.1)
+    assert found is not None
+    assert found.thickness_mm == pytest.approx(share * HEIGHT, rel=0.1)
+    assert not found.at_bound
+
+
+@pytest.mark.parametrize(("share", "bound"), [(0.95, 0.8), (0.3, 0.4)])
+def test_what_ends_at_the_bound_of_the_search_is_marked(share: float, bound: float) -> None:
+    """The outline of a breast that is pressed less, or more, than any gap tried."""
+    points, facets = ellipsoid()
+    found = estimate_thickness(
+        VIEW, outline_of(points, facets, share), lambda view: pressed(points, view), facets, HEIGHT
+    )
+    assert found is not None
+    assert found.thickness_mm == pytest.approx(bound * HEIGHT)
+    assert found.at_bound
 
 
 def test_failed_compressions_are_left_out_and_too_few_give_no_answer() -> None:
@@ -58,5 +72,7 @@ def test_failed_compressions_are_left_out_and_too_few_give_no_answer() -> None:
     def only_wide(view: ViewGeometry) -> Compressed | None:
         return pressed(points, view) if view.thickness_mm > 55.0 else None
 
-    assert estimate_thickness(VIEW, outline, only_wide, facets, HEIGHT) == pytest.approx(62.0, rel=0.1)
+    found = estimate_thickness(VIEW, outline, only_wide, facets, HEIGHT)
+    assert found is not None
+    assert found.thickness_mm == pytest.approx(62.0, rel=0.1)
     assert estimate_thickness(VIEW, outline, lambda _: None, facets, HEIGHT) is None

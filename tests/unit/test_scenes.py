@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mammoreg.breast.mechanics import BreastMechanics
+from mammoreg.breast.placed import place_breast
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.meshing.quality import scaled_jacobians
 from mammoreg.meshing.trilinear import GAUSS_POINTS, volumes
@@ -82,6 +84,16 @@ def test_an_equilibrium_passes_every_check(solved):
     checks = outside_checks(*solved)
     assert [check.name for check in checks if not check.passed] == []
     assert {"unbalanced force", "volume change", "penetration over gap"} <= {check.name for check in checks}
+
+
+def test_back_is_the_pipelines(solved):
+    """Held towards the chest wall alone, sliding both ways across it, and pressed where it lies between the plates."""
+    scene, _ = solved
+    mesh, ours = body_mesh("small", 5), scene.back
+    placed = place_breast(mesh, 0.0, BreastMechanics(fibre_ratio=0.0), 1.0, np.zeros(125))
+    np.testing.assert_array_equal(ours.held, placed.back.held)
+    np.testing.assert_allclose(ours.springs, placed.back.springs)
+    np.testing.assert_array_equal(scene.contact_quads, placed.contact_quads)
 
 
 def failed(scene, closed) -> set[str]:

@@ -1,7 +1,7 @@
 """Thickness of the compressed breast where the header does not give it (paper, section II-C)."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,14 +18,27 @@ SPREAD = 0.1
 EDGE_PASSES = 2
 
 
+@dataclass(frozen=True)
+class ThicknessEstimate:
+    """A plate gap from the outline.
+
+    Attributes:
+        thickness_mm: the gap.
+        at_bound: whether it is the widest or the narrowest gap tried, so that the outline may ask for more.
+    """
+
+    thickness_mm: float
+    at_bound: bool
+
+
 def estimate_thickness(
     view: ViewGeometry,
     outline: RadialOutline,
     compress: Callable[[ViewGeometry], Compressed | None],
     facets: SkinFacets,
     uncompressed_mm: float,
-) -> float | None:
-    """Plate gap, mm, at which the compressed breast is as wide as the mammogram shows it.
+) -> ThicknessEstimate | None:
+    """Plate gap at which the compressed breast is as wide as the mammogram shows it.
 
     The paper takes the thickness from the diameters in MR and mammogram; this compares the whole outline, after a few
     coarse compressions, and leans on the range of the paper's compressions where the outline says little.
@@ -38,7 +51,7 @@ def estimate_thickness(
         uncompressed_mm: height of the imaged part before compression.
 
     Returns:
-        The gap, or None where fewer than three compressions converged.
+        The estimate, or None where fewer than three compressions converged.
     """
     shares, misfits = [], []
     for share in SHARES:
@@ -59,7 +72,8 @@ def estimate_thickness(
             )
     if len(shares) < 3:
         return None
-    return _least(np.array(shares[::-1]), np.array(misfits[::-1])) * uncompressed_mm
+    share = _least(np.array(shares[::-1]), np.array(misfits[::-1]))
+    return ThicknessEstimate(share * uncompressed_mm, share in (shares[0], shares[-1]))
 
 
 def _least(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -18,6 +18,8 @@ CONTACT = 0.01
 """Largest share of the load that acts away from the plates, and of friction above its limit."""
 PENETRATION = 0.05
 """Deepest contact point inside a plate, as a share of their gap: the contact is soft, which shows at the lips."""
+FIRST_PENETRATION_MM = 2.0
+"""The limit of the study's first runs; it was moved to the share of the gap after they were seen."""
 REACH_MM = 1.0
 """Pressure further than this from a plate acts on nothing."""
 
@@ -67,6 +69,11 @@ def min_jacobian(scene: Scene, closed: Closed) -> float:
     return least_corner_jacobian(closed.deformed, scene.hexes)
 
 
+def deepest_mm(scene: Scene, closed: Closed) -> float:
+    """How far the deepest contact point lies inside a plate."""
+    return _pressed(scene, closed).penetration_mm(closed.deformed)
+
+
 def _pressed(scene: Scene, closed: Closed) -> Pressed:
     lower, upper = closed.height_mm, closed.height_mm + closed.gap_mm
     faces = tuple(
@@ -76,7 +83,7 @@ def _pressed(scene: Scene, closed: Closed) -> Pressed:
     pressure, traction = closed.contact.pressure, closed.contact.traction
     if not traction.size:
         traction = np.zeros((*pressure.shape, 3))
-    return Pressed((faces[0], faces[1]), scene.skin_quads, pressure, traction)
+    return Pressed((faces[0], faces[1]), scene.contact_quads, pressure, traction)
 
 
 def _unbalance(scene: Scene, closed: Closed, inner: InnerForces, plates: Floats) -> float:

@@ -41,7 +41,7 @@ class Pressed:
 
     Attributes:
         faces: the plates.
-        quads: faces (F, 4) of the skin.
+        quads: faces (F, 4) that may touch them.
         pressure: at 3 x 3 Simpson points (2, F, 9) per undeformed area, kPa.
         traction: friction there (2, F, 9, 3), kPa.
     """

@@ -14,8 +14,8 @@ from mammoreg.scenes.scenario import Scenario
 from mammoreg.scenes.tissue import FAT_KPA, SceneTissue, scene_tissue
 
 EDGE_MM = 8.0
-"""The plates end this far in front of the back's mean place, and behind none of its nodes: these are held and cannot
-make way."""
+"""The plates end this far in front of the back's mean place; where a scan's back bends forward they press it too, as in
+the pipeline."""
 LIP_RADIUS_MM = 8.0
 BACK_LAYER_MM = 35.0
 """Tissue between the back and the chest wall, which shears as the back slides; as in the pipeline."""
@@ -33,7 +33,7 @@ class Scene:
         scenario: what it was made of.
         points: undeformed nodes (N, 3), mm.
         hexes: corners (E, 8), VTK order.
-        skin_quads: faces (F, 4) that may touch the plates.
+        contact_quads: faces (F, 4) that may touch the plates, the skin's and the back's.
         tissue: constants of the elements.
         back: condition of the back.
         edge_p_mm: where the plates end.
@@ -43,7 +43,7 @@ class Scene:
     scenario: Scenario
     points: Floats
     hexes: NDArray[np.int64]
-    skin_quads: NDArray[np.int64]
+    contact_quads: NDArray[np.int64]
     tissue: SceneTissue
     back: BackCondition
     edge_p_mm: float
@@ -64,12 +64,12 @@ def build_scene(scenario: Scenario, mesh: BlockMesh) -> Scene:
     tissue = scene_tissue(scenario.material, scenario.poisson, scenario.contrast, scenario.compression, gland)
     model = HyperelasticModel(mesh.points, mesh.hexes(), tissue.material())
     shear = FAT_KPA / BACK_LAYER_MM
-    back = back_condition("slide_compression", mesh.points, mesh.back_quads(), along_kpa_per_mm=shear)
-    place = mesh.points[mesh.back_nodes(), 1]
-    edge = min(float(place.mean()) - EDGE_MM, float(place.min()))
+    back = back_condition("shear_layer", mesh.points, mesh.back_quads(), along_kpa_per_mm=shear)
+    edge = float(mesh.points[mesh.back_nodes(), 1].mean()) - EDGE_MM
+    faces = np.concatenate([mesh.skin_quads(), mesh.back_quads()])
     options = contact_options(float(np.average(model.material.mu_kpa, weights=model.volume)))
-    closing = Closing(model, mesh.skin_quads(), back, edge, LIP_RADIUS_MM, scenario.friction, options)
-    return Scene(scenario, mesh.points, mesh.hexes(), mesh.skin_quads(), tissue, back, edge, closing)
+    closing = Closing(model, faces, back, edge, LIP_RADIUS_MM, scenario.friction, options)
+    return Scene(scenario, mesh.points, mesh.hexes(), faces, tissue, back, edge, closing)
 
 
 def contact_options(mean_kpa: float) -> ClosingOptions:

@@ -8,7 +8,7 @@ import numpy as np
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.plates.closing import Closed
 from mammoreg.meshing.block import BlockMesh
-from mammoreg.scenes.checks import Check, min_jacobian, outside_checks
+from mammoreg.scenes.checks import Check, deepest_mm, min_jacobian, outside_checks
 from mammoreg.scenes.scenario import Scenario
 from mammoreg.scenes.scene import Scene, build_scene
 
@@ -25,6 +25,7 @@ class Trial:
         volume_change: relative, of the whole breast.
         force_n: mean of the plates' forces.
         width_mm, depth_mm: extent of the deformed breast along medial and posterior.
+        penetration_mm: how far the deepest contact point lies inside a plate.
         wall_s: time of the solve.
         checks: name, value and limit of each check from outside.
     """
@@ -38,6 +39,7 @@ class Trial:
     force_n: float | None = None
     width_mm: float | None = None
     depth_mm: float | None = None
+    penetration_mm: float | None = None
     wall_s: float | None = None
     checks: tuple[Check, ...] = ()
 
@@ -82,6 +84,7 @@ def _judged(scene: Scene, closed: Closed, wall_s: float) -> Trial:
         force_n=0.5 * sum(closed.force_n),
         width_mm=float(extent[0]),
         depth_mm=float(extent[1]),
+        penetration_mm=deepest_mm(scene, closed),
         wall_s=wall_s,
         checks=checks,
     )

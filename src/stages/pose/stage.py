@@ -50,7 +50,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     nipple = lps_to_breast(segment.array("nipple", "mm"), subject.laterality)
     mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
     compress = coarse_compression(mesh, settings.mechanics.numerics(), mu_kpa, plates_known=seen.placed)
-    start, estimated = start_view(seen, mesh, compress)
+    start, estimated, doubts = start_view(seen, mesh, compress)
     tissue = coarse_tissue(segment, mesh) if settings.use_density and not seen.placed else None
     found = estimate_pose(
         start,
@@ -68,7 +68,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         return _fields(seen, mesh, nipple, start, start, known, estimated, (NOT_DRAWN,))
     if found is None:
         raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
-    flags = () if seen.placed else _angle_flags(found)
+    flags = () if seen.placed else (*doubts, *_angle_flags(found))
     return _fields(seen, mesh, nipple, start, found.view, _search_values(found, seen), estimated, flags)
 
 

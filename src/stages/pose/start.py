@@ -16,19 +16,20 @@ from mammoreg.pose.thickness import estimate_thickness
 from stages.engine.contract import Array, Fields, Subject
 from stages.pose.view_facts import Seen
 
+THICKNESS_AT_BOUND = "estimated thickness at the bound of its search"
 EDGE_QUANTILE = 0.25  # a plate's edge reaches in front of most, not all, of the breast's back
 
 
 def start_view(
     seen: Seen, mesh: BlockMesh, compress: Callable[[ViewGeometry], Compressed | None]
-) -> tuple[ViewGeometry, tuple[str, ...]]:
-    """Geometry from the volume-preserving scaling at the header's angle, and the names of what was estimated.
+) -> tuple[ViewGeometry, tuple[str, ...], tuple[str, ...]]:
+    """Geometry from the volume-preserving scaling at the header's angle, the names of what was estimated, and doubts.
 
     Raises:
         DataError: the mammogram's thickness is no compression of this breast, or cannot be estimated.
     """
     if seen.placed:
-        return seen.geometry, seen.estimated
+        return seen.geometry, seen.estimated, ()
     turned = breast_to_plate(mesh.points, seen.geometry.angle_deg)
     view = replace(
         seen.geometry,
@@ -36,21 +37,24 @@ def start_view(
         middle_mm=float(turned[:, 0].mean()),
     )
     estimated = seen.estimated
+    doubts: tuple[str, ...] = ()
     front = turned[turned[:, 1] < view.edge_p_mm, 2]
     height = float(np.ptp(front if len(front) else turned[:, 2]))
     if not np.isfinite(view.thickness_mm):
         facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
-        thickness = estimate_thickness(view, seen.outline, compress, facets, height)
-        if thickness is None:
+        found = estimate_thickness(view, seen.outline, compress, facets, height)
+        if found is None:
             raise DataError("the compressed thickness is unknown and cannot be estimated; give thickness_mm")
-        view = replace(view, thickness_mm=thickness)
+        view = replace(view, thickness_mm=found.thickness_mm)
+        doubts = (THICKNESS_AT_BOUND,) if found.at_bound else ()
         estimated = tuple(dict.fromkeys((*estimated, "thickness_mm")))
     if view.thickness_mm >= height:
         raise DataError(
             f"the compressed thickness of {view.thickness_mm:.1f} mm is not below the uncompressed breast's "
             f"{height:.1f} mm; correct thickness_mm in the views table (or the header), or check the MR volume's side"
         )
-    return fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, seen.outline).alignment.view, estimated
+    scaled = fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, seen.outline)
+    return scaled.alignment.view, estimated, doubts
 
 
 def without_image(mesh: BlockMesh, subject: Subject) -> Fields:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from statistics import median
 from typing import Any
 
+from mammoreg.scenes.checks import FIRST_PENETRATION_MM, PENETRATION
 from mammoreg.scenes.design import ORDINARY, WORST
 from stages.formats.pages import Section, section_of
 
@@ -53,9 +54,20 @@ def summary(rows: Sequence[Row]) -> tuple[list[str], list[Section]]:
     ]
     if lost := [row["scenario"] for row in ran if not (row["converged"] and row["checks_passed"])]:
         first.append(f"Missed, each listed below: {', '.join(lost)}. One of them again: {_AGAIN % lost[0]}")
+    first.append(_moved_limit(solved))
     if len(ran) < len(rows):
         first.append(f"{len(rows) - len(ran)} of {len(rows)} scenarios did not run; the last table says why.")
     return first, _sections(rows, ran, solved)
+
+
+def _moved_limit(solved: Sequence[Row]) -> str:
+    """What a reader has to know of a limit that was not set before the first runs."""
+    deeper = [row["scenario"] for row in solved if row["penetration_mm"] > FIRST_PENETRATION_MM]
+    return (
+        f"The limit of the penetration was moved after the first runs, from {FIRST_PENETRATION_MM:g} mm to "
+        f"{100 * PENETRATION:g} % of the gap; by the first limit {len(deeper)} of {len(solved)} answers would fail"
+        + (f": {', '.join(deeper)}." if deeper else ".")
+    )
 
 
 def _sections(rows: Sequence[Row], ran: Sequence[Row], solved: Sequence[Row]) -> list[Section]:
