@@ -198,3 +198,17 @@ def test_nothing_converges() -> None:
     press = Press(breast(LONG).points, fails=lambda angle: True)
     assert search(LONG, 0.0, press) is None
     assert len(press.angles) < 12
+
+
+def test_candidates_tell_the_models_rim_from_skin() -> None:
+    """A back that bends forward at the sides ends in front of the image's edge, where the outline goes on."""
+    mesh, whole = breast(LONG), search(LONG, 0.0, dense=False)
+    bent = mesh.points + [0.0, -60.0, 0.0] * (mesh.points[:, :1] / LONG[0]) ** 2
+    found = search(LONG, 0.0, Press(bent), dense=False)
+    assert whole is not None
+    assert found is not None
+    assert {c.rim_share for c in whole.candidates} == {0.0}
+    assert all(c.skin.rms_mm == c.alignment.rms_mm for c in whole.candidates)
+    for candidate in found.candidates:
+        assert 0.05 < candidate.rim_share < 0.5
+        assert abs(candidate.skin.rms_mm - candidate.alignment.rms_mm) > 0.5

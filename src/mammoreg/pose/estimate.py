@@ -14,7 +14,7 @@ from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.locate import interpolate
 from mammoreg.meshing.skin import SkinFacets
-from mammoreg.pose.alignment import Alignment, align
+from mammoreg.pose.alignment import Alignment, align, measure
 from mammoreg.pose.density import DensityImage, density_correlation, projected_structure
 from mammoreg.pose.outline import RadialOutline
 
@@ -52,12 +52,27 @@ class DenseTissue:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One projection angle and how well it explains the mammogram."""
+    """One projection angle and how well it explains the mammogram.
+
+    Attributes:
+        angle_deg: the angle.
+        alignment: silhouette on the outline.
+        skin: the same silhouette compared where skin makes it, not the rim at which the model ends.
+        ncc: correlation of dense tissue.
+        misfit: what is minimised.
+    """
 
     angle_deg: float
     alignment: Alignment
+    skin: Alignment
     ncc: float
     misfit: float
+
+    @property
+    def rim_share(self) -> float:
+        """Share of the outline, by trust, that is compared with the rim: there the misfit tells of no angle."""
+        whole = float(self.alignment.weight.sum())
+        return 1.0 - float(self.skin.weight.sum()) / whole if whole > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -117,10 +132,12 @@ def estimate_pose(
         if compressed is None:
             return None
         at = replace(at, height_mm=compressed.height_mm)
-        state = align(facets.positions(compressed.nodes), facets.quads, at, outline)
+        skin = facets.positions(compressed.nodes)
+        state = align(skin, facets.quads, at, outline)
         ncc, patches = _density(compressed.nodes, state.view, tissue, mammogram)
         misfit = _misfit(state.rms_mm, ncc, patches, offset_deg / prior_sd_deg)
-        return Candidate(at.angle_deg, state, ncc, misfit)
+        on_skin = measure(skin, facets.quads, state.view, outline, facets.rim)
+        return Candidate(at.angle_deg, state, on_skin, ncc, misfit)
 
     first = judge(0.0, view)
     # The plates' edge moves with the first alignment, and the compression with the edge.

@@ -89,6 +89,8 @@ def _search_values(found: PoseEstimate, seen: Seen) -> dict[str, Value]:
             {
                 "angle_deg": c.angle_deg,
                 "outline_rms_mm": c.alignment.rms_mm,
+                "skin_rms_mm": c.skin.rms_mm if np.isfinite(c.skin.rms_mm) else None,
+                "rim_share": c.rim_share,
                 "density_ncc": c.ncc,
                 "misfit": c.misfit,
                 "edge_p_mm": c.alignment.view.edge_p_mm,
