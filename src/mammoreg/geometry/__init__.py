@@ -8,6 +8,13 @@ Three frames are used, all in mm:
   patients mirror exactly.
 * plate: the breast frame turned about the posterior axis by the projection angle, (medial along the plate, posterior,
   height towards the source).
+
+A point source stands above the chest-wall edge of the detector, in its middle row; the detector lies on the lower
+plate's far side. From the breast the source lies along (-s sin a, 0, cos a) in LPS, a the projection angle: positive a
+turns it towards the middle of the body. CC: a small signed roll, 0 in headers; MLO: the absolute value of the header's
+angle. In an image as usually stored, rows of pixels run between chest wall and nipple and follow each other along
+(-s cos a, 0, -sin a), which is towards medial. Plates end at the detector's chest-wall edge; the image shows only
+what lies in front of it.
 """
 
 from mammoreg.geometry.frames import breast_to_lps, breast_to_plate, lps_to_breast, plate_to_breast

@@ -10,7 +10,7 @@ from mammoreg.geometry.frames import Points
 
 @dataclass(frozen=True)
 class ViewGeometry:
-    """Where plates, detector and source stand in the plate frame (contract, Geometry).
+    """Where plates, detector and source stand in the plate frame; see the package docstring.
 
     The image is canonical: column 0 lies at the chest-wall edge and columns count towards the nipple; rows count
     towards medial (the plate frame's first axis). Pixel indices are those of pixel centres.
@@ -52,7 +52,7 @@ class ViewGeometry:
 
     @property
     def middle_magnification(self) -> float:
-        """Magnification at half the plate gap, by which detector distances are divided (contract, Measures)."""
+        """Magnification at half the plate gap; distances on the detector divided by it are those in the breast."""
         return self.source_detector_mm / (self.source_detector_mm - self.support_detector_mm - 0.5 * self.thickness_mm)
 
     def magnification(self, height: NDArray[np.float64]) -> NDArray[np.float64]:

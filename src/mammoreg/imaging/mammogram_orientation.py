@@ -46,7 +46,9 @@ class Flips:
 
 
 def flips_of_orientation(orientation: str, laterality: Laterality, view: View) -> Flips:
-    r"""Decide the flips from PatientOrientation, side and view (contract, Geometry).
+    r"""Decide the flips from PatientOrientation, side and view.
+
+    Usual values are ``A\R`` (left CC), ``P\L`` (right CC), ``A\FR`` (left MLO) and ``P\FL`` (right MLO).
 
     Args:
         orientation: row direction and column direction as stored, such as ``A\FR``; one letter of each is enough.

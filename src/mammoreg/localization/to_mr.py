@@ -40,7 +40,10 @@ class MrPrediction:
 
 
 def locate_in_breast(views: Mapping[str, BreastInView], areas: Mapping[str, LesionArea]) -> MrPrediction:
-    """Locate a lesion marked in one or two views (contract, Measures): region, or closest approach of the beams.
+    """Locate a lesion marked in one or two views.
+
+    Of two views the point is the centroid of the region where the back-projected areas meet or, where they do not, the
+    middle of the beams' closest approach; of one view the middle of its curve.
 
     Args:
         views: by view name, all on one grid.

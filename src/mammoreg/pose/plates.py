@@ -1,7 +1,7 @@
 """Compression plates found in the mask of a second MR volume, taken between the plates.
 
-The plates show as two parallel flat faces of the body's outline. Only the mask is read (contract, "What may be read
-for what"): tilt, heights, and the posterior end of the flat faces, where the plates end.
+The plates show as two parallel flat faces of the body's outline. Only the mask is read, no
+intensities: tilt, heights, and the posterior end of the flat faces, where the plates end.
 """
 
 from dataclasses import dataclass

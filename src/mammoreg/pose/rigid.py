@@ -19,7 +19,10 @@ def rigid_view(
     nipple: Points,
     nipple_px: NDArray[np.float64] | None,
 ) -> ViewGeometry:
-    """Geometry of the undeformed breast over the image (contract, method `rigid`).
+    """Geometry of the undeformed breast over the image.
+
+    It is turned to the header's angle, projected by parallel beams, magnified for the plates' middle, and laid over the
+    image by the nipple or, where that is not seen, by the outline.
 
     Args:
         skin: undeformed surface nodes (N, 3), breast frame, mm.

@@ -67,7 +67,7 @@ def build_scene(scenario: Scenario, mesh: BlockMesh) -> Scene:
     back = back_condition("shear_layer", mesh.points, mesh.back_quads(), along_kpa_per_mm=shear)
     edge = float(mesh.points[mesh.back_nodes(), 1].mean()) - EDGE_MM
     faces = np.concatenate([mesh.skin_quads(), mesh.back_quads()])
-    options = contact_options(float(np.average(model.material.mu_kpa, weights=model.volume)))
+    options = contact_options(model.mean_mu_kpa)
     closing = Closing(model, faces, back, edge, LIP_RADIUS_MM, scenario.friction, options)
     return Scene(scenario, mesh.points, mesh.hexes(), faces, tissue, back, edge, closing)
 

@@ -65,7 +65,7 @@ def estimate_shape(
         NotConvergedError: with the reason.
     """
     before = after = measure(facets.positions(closed.deformed), facets.quads, view, outline, facets.rim)
-    mu_kpa = float(np.average(closing.model.material.mu_kpa, weights=closing.model.volume))
+    mu_kpa = closing.model.mean_mu_kpa
     memory, held, done = np.zeros(len(outline.theta)), None, 0
     best = (before, closed)
     while done < rounds and _mean_misfit(after) > settled_mm:

@@ -6,6 +6,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.geometry.quads import node_area_vectors
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 BackName = Literal["fixed", "slide_compression", "shear_layer", "slide_plane", "springs"]
@@ -72,7 +74,7 @@ def back_condition(
     if name in ("slide_compression", "shear_layer"):
         slides = np.array([name == "shear_layer", False, True])
         held = held_back(nodes, ~slides, pull_mm)
-        area = np.linalg.norm(_node_areas(points, np.asarray(quads, dtype=np.int64))[nodes], axis=1)
+        area = np.linalg.norm(node_area_vectors(points, np.asarray(quads, dtype=np.int64))[nodes], axis=1)
         held.springs[:] = along_kpa_per_mm * area[:, None, None] * np.diag(slides)
         return held
     tangential = tangential_kpa_per_mm if name == "springs" else RESIDUAL_STIFFNESS_KPA_PER_MM
@@ -83,18 +85,9 @@ def back_condition(
 
 def _springs(points: Array, quads: Integers, nodes: Integers, tangential: float) -> Array:
     """Stiffness (B, 3, 3) in mN/mm: stiff along the nodes' normals, `tangential` across, times their share of area."""
-    area = _node_areas(points, quads)
+    area = node_area_vectors(points, quads)
     size = np.linalg.norm(area[nodes], axis=1)
     normal = area[nodes] / size[:, None]
     dyad = normal[:, :, None] * normal[:, None, :]
     across = tangential * (np.eye(3) - dyad)
     return np.asarray(size[:, None, None] * (NORMAL_STIFFNESS_KPA_PER_MM * dyad + across))
-
-
-def _node_areas(points: Array, quads: Integers) -> Array:
-    """Each node's share of the faces' area vectors (N, 3), mm2."""
-    corners = points[quads]
-    face = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    area = np.zeros((len(points), 3))
-    np.add.at(area, quads.ravel(), np.repeat(0.25 * face, 4, axis=0))
-    return area

@@ -87,7 +87,7 @@ class Closing:
         self.lower_mm, self.parts, self.extra_nodes, self.moving = lower_mm, tuple(parts), extra_nodes, moving
         self.points = all_nodes(model.points, extra_nodes)
         self.options = options if options is not None else ClosingOptions()
-        mu = float(np.average(model.material.mu_kpa, weights=model.volume))
+        mu = model.mean_mu_kpa
         surface = ContactSurface(self.points, skin_quads, self.options.rule)
         stiffness = self.options.penalty_per_mm * mu
         self.contact = SoftContact(surface, stiffness, self.options.band_mm, friction, self.options.slip_mm)

@@ -100,7 +100,7 @@ class DampedEquilibrium:
     def _weight(self) -> Array:
         """Damping (total,) per unit of the damping factor, mN/mm: mu times the node's share of volume over h^2."""
         volume = np.bincount(self.model.hexes.ravel(), weights=np.repeat(self.model.volume / 8.0, 8))
-        mu = float(np.average(self.model.material.mu_kpa, weights=self.model.volume))
+        mu = self.model.mean_mu_kpa
         size = float(np.mean(self.model.volume)) ** (1.0 / 3.0)
         body, extra = self.points[: len(volume)], self.points[len(volume) :]
         lumped = np.append(volume, volume[cKDTree(body).query(extra)[1]])

@@ -1,4 +1,4 @@
-"""Guess of the deformation at the next plate gap: affine, volume kept (design note on the solver, recipe 2)."""
+"""Guess of the deformation at the next plate gap: affine, and the volume is kept."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

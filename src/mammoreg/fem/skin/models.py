@@ -83,7 +83,7 @@ def skin_model(
     points = np.concatenate([model.points, model.points[under]])
     stiffness = RESTING_PER_MM * law.mu_kpa
     if adherent:
-        stiffness = pressed_per_mm * float(np.average(model.material.mu_kpa, weights=model.volume))
+        stiffness = pressed_per_mm * model.mean_mu_kpa
     membrane = Membrane(points, own, law, thickness_mm)
     interface = skin_interface(points, quads, own, stiffness, law.mu_kpa, adherent=adherent)
     return SkinModel((membrane, interface), points[len(model.points) :], own if adherent else quads, adherent)

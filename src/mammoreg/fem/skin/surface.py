@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.geometry.quads import node_area_vectors
+
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -55,11 +57,7 @@ class QuadSurface:
 
     def areas(self, positions: Array) -> Array:
         """Area vectors (N, 3), mm2, that nodes share of the faces around them."""
-        corners = positions[self.quads]
-        face = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-        areas = np.zeros_like(positions)
-        np.add.at(areas, self.quads.ravel(), np.repeat(0.25 * face, 4, axis=0))
-        return areas
+        return node_area_vectors(positions, self.quads)
 
     def normals(self, positions: Array) -> Array:
         """Unit normals (N, 3) at the surface's nodes, zero elsewhere."""

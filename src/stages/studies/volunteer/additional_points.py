@@ -10,6 +10,7 @@ from mammoreg.fem.parts.point_ties import point_ties
 from mammoreg.fem.plates.closing import Closed
 from mammoreg.geometry import breast_to_plate, lps_to_breast
 from mammoreg.geometry.frames import Points
+from mammoreg.geometry.quads import area_vectors
 from mammoreg.shape.surface_points import nearest_on_skin
 from stages.compress.record import resumed
 from stages.engine.artefact import Artefact
@@ -112,6 +113,5 @@ def _in_plate_frame(case: VolunteerCase, deformed: Points, goal: Points) -> Poin
 
 def _face_mm(case: VolunteerCase) -> float:
     """Side of the skin's mean face."""
-    corners = case.block.points[case.block.skin_quads()]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
-    return float(np.sqrt(area.mean()))
+    areas = area_vectors(case.block.points, case.block.skin_quads())
+    return float(np.sqrt(np.linalg.norm(areas, axis=1).mean()))
