@@ -34,7 +34,7 @@ def _run(given: argparse.Namespace) -> int:
     subject = Subject(given.case, given.laterality, given.view, dict(map(_pair, given.row)))
     fields = run_stage(given.stage, inputs, given.out, _settings(given.settings), subject)
     print(f"{given.out}: {fields.status}{f' ({fields.message})' if fields.message else ''}")
-    return 0
+    return 1 if fields.status == "bug" else 0
 
 
 def _check(given: argparse.Namespace) -> int:

@@ -73,6 +73,14 @@ def mr_lesions(inputs: Inputs) -> dict[str, MrLesion]:
     return {MASK_NAME: MaskLesion(read_mask(path))}
 
 
+def mr_lesion_names(inputs: Inputs) -> list[str]:
+    """Names of the lesions of `mr_lesion`; a mask is not opened for that."""
+    path = inputs.path("mr_lesion")
+    if path is None:
+        return []
+    return list(read_spheres(path)) if path.suffix == ".tsv" else [MASK_NAME]
+
+
 def view_landmarks(inputs: Inputs, view: str) -> dict[str, NDArray[np.float64]]:
     """Landmarks of a mammogram by name, stored pixels (column, row); none without the file."""
     path = inputs.path(f"landmarks_{view}")

@@ -11,6 +11,7 @@ from mammoreg.geometry.frames import Laterality, plate_rotation
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Array, Fields, VolumeField, write_artefact
+from stages.engine.failures import Failure
 
 SHRINK = 0.7
 ROWS, COLUMNS, PIXEL_MM = 700, 400, 0.25
@@ -90,6 +91,7 @@ def write_pose(path: Path, laterality: Laterality, view: str, flips: tuple[bool,
     placed = {name: getattr(g, name) for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")}
     values: dict[str, Any] = {**placed, **{f"rigid_{name}": value for name, value in placed.items()}}
     values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": []}
+    values |= {"estimated": ["source_detector_mm"]}
     values |= {"drawn_mm": [0.0, 0.0, 0.0]}
     values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}
     values |= {"flip_rows": flips[0], "flip_columns": flips[1]}
@@ -121,7 +123,7 @@ def write_solution(path: Path, laterality: Laterality, stage: str, view: str) ->
 
 
 def write_failed(path: Path, laterality: Laterality, stage: str, view: str = "", message: str = "went wrong") -> Path:
-    write_artefact(path, header(stage, laterality, view), Fields(status="failed", message=f"{stage}: {message}"))
+    write_artefact(path, header(stage, laterality, view), Fields(failure=Failure(stage, view, "failed", message)))
     return path
 
 

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from mammoreg.geometry import Volume
-from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact, write_bytes
+from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
 from stages.engine.errors import ArtefactError
+from stages.engine.writing import write_bytes
 
 ATTRS = {"stage": "segment", "case": "c", "view": "", "laterality": "L", "artefact_id": "x"}
 

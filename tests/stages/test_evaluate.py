@@ -7,21 +7,23 @@ import numpy as np
 import pytest
 
 from mammoreg.geometry import breast_to_lps, plate_to_breast
-from stages.engine.artefact import Artefact
+from stages.engine.artefact import Array, Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
 from tests.stages import synthetic_case as synthetic
-from tests.stages.test_localize import LESION, POINTS, localized, mr_marks, view_marks, write_tsv
+from tests.stages.test_localize import LESION, POINTS, localized, mr_marks, view_marks, write_mask, write_tsv
 
 OFFSET_PX = np.array([12.0, 16.0])  # 20 pixels of 0.25 mm: 5 mm at the detector
 
 
-def evaluated(folder: Path, inputs: dict[str, Any], settings: dict[str, Any] | None = None) -> Artefact:
+def evaluated(
+    folder: Path, inputs: dict[str, Any], settings: dict[str, Any] | None = None, row: dict[str, str] | None = None
+) -> Artefact:
     known = {name: paths for name, paths in inputs.items() if name in ("segment", "mesh", "pose", "compress", "solve")}
     localize_marks = {n: p for n, p in inputs.items() if n.startswith(("mr_l", "lesion"))}
     localized(known | localize_marks, folder / "localize.h5")
     everything = inputs | {"localize": folder / "localize.h5"}
-    run_stage("evaluate", everything, folder / "evaluate.h5", settings or {}, Subject("case1"))
+    run_stage("evaluate", everything, folder / "evaluate.h5", settings or {}, Subject("case1", row=row or {}))
     return Artefact(folder / "evaluate.h5")
 
 
@@ -133,6 +135,71 @@ def test_a_failed_case_counts_with_empty_distances(tmp_path: Path) -> None:
     assert [row["views"] for row in rows_of(found, "table_6_rows", "updated")] == ["CC+MLO"]
     assert all(row["distance_mm"] is None for row in rows_of(found, "landmark_rows", "updated"))
     assert found.value("view_rows") == []
+
+
+def test_a_bug_leaves_rows_with_empty_distances(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    marks = mr_marks(tmp_path, "R") | view_marks(tmp_path, ("CC", "MLO"), (False, False)) | landmark_truth(tmp_path)
+
+    def broken(*_: Any) -> None:
+        raise IndexError
+
+    monkeypatch.setattr("stages.evaluate.stage.fit_rows", broken)
+    found = evaluated(tmp_path, inputs | marks)
+    assert found.failure is not None
+    assert (found.failure.stage, found.status) == ("evaluate", "bug")
+    assert [row["distance_mm"] for row in rows_of(found, "table_5_rows", "updated")] == [None, None]
+    assert [row["distance_mm"] for row in rows_of(found, "table_6_rows", "plate")] == [None]
+    assert {row["landmark"] for row in rows_of(found, "landmark_rows", "updated")} == {"p1", "p2", "deep"}
+
+
+def test_a_mask_of_another_size_is_told_once(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",)) | mr_marks(tmp_path, "R")
+    table = write_tsv(
+        tmp_path / "lesion.tsv", "name x y z diameter_mm", {"lesion": [*breast_to_lps(LESION, "R"), 10.0]}
+    )
+    mask = write_mask(tmp_path / "mask.png", (500, 300))
+    found = evaluated(tmp_path, inputs | {"mr_lesion": table, "lesion_CC": mask})
+    assert found.failure is not None
+    assert found.failure.stage == "localize"
+    assert [row["distance_mm"] for row in rows_of(found, "table_5_rows", "updated")] == [None]
+
+
+def test_columns_of_the_solution_and_of_what_was_estimated(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    solved = {"force_lower_n": 60.0, "force_upper_n": 64.0, "penetration_mm": 1.25, "folded_corners": 3}
+    old = Artefact(inputs["solve"][0])
+    again = Fields({"deformed": Array(old.array("deformed", "mm"), "mm", "nodes")}, values=solved)
+    write_artefact(inputs["solve"][0], synthetic.header("solve", "R", "CC"), again)
+    rows = {row["method"]: row for row in evaluated(tmp_path, inputs).value("view_rows")}
+    names = ("force_n", "penetration_mm", "folded_corners", "outline_step", "estimated")
+    assert [rows["updated"][name] for name in names] == [62.0, 1.25, 3.0, None, "source_detector_mm"]
+    assert [rows["rigid"][name] for name in names] == [None, None, None, None, "source_detector_mm"]
+
+
+@pytest.mark.parametrize(
+    ("views", "told", "trust"),
+    [
+        (("CC",), "0.30", "compression 30 % in the cases table, 40 % in the mammogram"),
+        (("CC",), "0.38", ""),
+        (("CC",), "", ""),
+        (("3D",), "0.50", "compression 50 % in the cases table, 40 % in the second volume"),
+    ],
+)
+def test_another_compression_than_the_table_s_warns(tmp_path: Path, views: tuple[str], told: str, trust: str) -> None:
+    inputs = synthetic.write_case(tmp_path, views=views, compressed=views == ("3D",))
+    old = Artefact(inputs["compress"][0])
+    values = {name: old.value(name) for name in old.value_names()} | {"compression": 0.4}
+    again = Fields({"deformed": Array(old.array("deformed", "mm"), "mm", "nodes")}, values=values)
+    write_artefact(inputs["compress"][0], synthetic.header("compress", "R", views[0]), again)
+    found = evaluated(tmp_path, inputs, row={"compression": told} if told else {})
+    assert {row["trust"] for row in found.value("view_rows") if row["method"] in ("plate", "updated")} == {trust}
+
+
+def test_a_compression_without_any_image_has_nothing_to_differ_from(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("3D",), outlined=False)
+    found = evaluated(tmp_path, inputs, row={"compression": "0.9"})
+    assert {row["trust"] for row in found.value("view_rows")} == {""}
 
 
 def test_one_view_measures_the_distance_to_its_curve(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from PIL import Image
 
 from mammoreg.geometry import breast_to_lps, plate_to_breast
 from mammoreg.geometry.frames import Laterality
-from stages.engine.artefact import Artefact
+from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
 from tests.stages import synthetic_case as synthetic
@@ -206,6 +206,60 @@ def test_a_failed_mesh_is_passed_on(tmp_path: Path) -> None:
     inputs["mesh"] = [synthetic.write_failed(tmp_path / "failed.h5", "R", "mesh", message="turned inside out")]
     found = localized(inputs | mr_marks(tmp_path, "R"), tmp_path / "localize.h5")
     assert (found.status, found.message) == ("failed", "mesh: turned inside out")
+
+
+@pytest.mark.parametrize("stage", ["segment", "mesh"])
+def test_what_could_not_be_predicted_is_a_row_with_its_message(tmp_path: Path, stage: str) -> None:
+    inputs = synthetic.write_case(tmp_path, compressed=True)
+    inputs[stage] = [synthetic.write_failed(tmp_path / "failed.h5", "R", stage, message="turned inside out")]
+    write_artefact(
+        tmp_path / "segment_given.h5",
+        synthetic.header("segment", "R") | {"inputs": '{"mr": [], "mr_compressed": []}'},
+        Fields(failure=Artefact(inputs[stage][0]).failure),
+    )
+    inputs["segment"] = [tmp_path / "segment_given.h5"]
+    for name in ("pose", "compress", "solve"):
+        inputs[name] = [synthetic.write_failed(tmp_path / f"{name}.{v}.h5", "R", name, v) for v in ("CC", "MLO")]
+    marks = mr_marks(tmp_path, "R") | view_marks(tmp_path, ("CC", "MLO"), (False, False))
+    found = localized(inputs | marks, tmp_path / "localize.h5")
+    shown = rows_of(found, "mammogram_rows")
+    assert {(r["view"], r["name"]) for r in shown} == {(v, n) for v in ("CC", "MLO") for n in ("mass", *POINTS)}
+    assert all((r["seen"], r["column"], r["message"]) == (False, None, f"{stage}: turned inside out") for r in shown)
+    (lesion,) = rows_of(found, "mr_rows")
+    assert (lesion["views"], lesion["name"], lesion["x"]) == ("CC+MLO", "mass", None)
+    assert lesion["message"] == f"{stage}: turned inside out"
+    carried = rows_of(found, "compressed_rows")
+    assert {r["name"]: (r["x"], r["message"]) for r in carried} == dict.fromkeys(
+        POINTS, (None, f"{stage}: turned inside out")
+    )
+
+
+def test_a_bug_in_localize_leaves_rows_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+
+    def broken(*_: Any) -> None:
+        raise IndexError
+
+    monkeypatch.setattr("stages.localize.stage.predict_in_mr", broken)
+    found = localized(inputs | mr_marks(tmp_path, "R"), tmp_path / "localize.h5")
+    assert found.status == "bug"
+    assert {row["name"] for row in rows_of(found, "mammogram_rows")} == {"mass", *POINTS}
+    assert {row["seen"] for row in rows_of(found, "mammogram_rows")} == {False}
+
+
+def test_a_landmark_without_compression_has_a_message(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("3D",), compressed=True)
+    for stage in ("compress", "solve"):
+        inputs[stage] = [synthetic.write_failed(tmp_path / f"{stage}_failed.h5", "R", stage, "3D", "diverged")]
+    found = localized(inputs | mr_marks(tmp_path, "R"), tmp_path / "localize.h5")
+    rows = {row["method"]: row for row in found.value("compressed_rows") if row["name"] == "p1"}
+    assert {method: row["message"] for method, row in rows.items()} == {
+        "rigid": "",
+        "scaling": "",
+        "plate": "compress: diverged",
+        "updated": "solve: diverged",
+    }
+    assert rows["plate"]["x"] is None
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,12 @@ from typing import Any
 
 import pytest
 
+from mammoreg.metrics.findings import judged, numbers_of
 from mammoreg.metrics.summary import Summary
 from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
-from stages.studies.volunteer.paper_sentences import CLAIMS, PAPER, numbers_of, sentences
+from stages.studies.volunteer.paper_sentences import CLAIMS, PAPER, sentences
 from stages.studies.volunteer.stage import TABLES
 from tests.stages import synthetic_case as synthetic
 
@@ -25,7 +26,7 @@ COLUMNS = {
 @pytest.mark.parametrize("table", list(CLAIMS))
 def test_the_paper_agrees_with_itself(table: str) -> None:
     paper = numbers_of(PAPER[table])
-    (found,) = sentences(CLAIMS[table], paper, paper)
+    (found,) = sentences(judged(CLAIMS[table], paper, paper))
     assert found.startswith("Agrees with the paper: ")
     assert found.count("(paper: ") == len(CLAIMS[table])
 
@@ -33,7 +34,7 @@ def test_the_paper_agrees_with_itself(table: str) -> None:
 def test_numbers_decide() -> None:
     paper = PAPER["table_3"]
     worse = paper | {"updated": Summary(17, 17, mean_mm=3.24, sd_mm=1.0, max_mm=4.4)}
-    agrees, differs = sentences(CLAIMS["table_3"], numbers_of(paper), numbers_of(worse))
+    agrees, differs = sentences(judged(CLAIMS["table_3"], numbers_of(paper), numbers_of(worse)))
     assert "additional points lower the mean (paper: 3.1 to 2.6 mm; here: 3.1 to 2.6 mm)" in agrees
     assert "updated boundary conditions keep every landmark within 5 mm (paper: 4.3 mm; here: 4.4 mm)" in agrees
     assert "updated boundary conditions lower the mean (paper: 3.1 to 2.7 mm; here: 3.1 to 3.2 mm)" in differs
@@ -43,7 +44,7 @@ def test_what_rounding_hides_counts_for_nothing() -> None:
     paper = PAPER["table_4"]
     same = dict.fromkeys(paper, Summary(17, 17, mean_mm=2.04, max_mm=5.0))
     same |= {"attached": replace(same["none"], mean_mm=1.96), "attached lateral": same["none"]}
-    (found,) = sentences(CLAIMS["table_4"], numbers_of(paper), numbers_of(same))
+    (found,) = sentences(judged(CLAIMS["table_4"], numbers_of(paper), numbers_of(same)))
     assert found.startswith("Does not agree: ")
     assert "attached skin lowers the mean distance (paper: 3.4 to 3.3 mm; here: 2.0 to 2.0 mm)" in found
 
@@ -51,7 +52,7 @@ def test_what_rounding_hides_counts_for_nothing() -> None:
 def test_a_missing_solution_is_not_judged() -> None:
     paper = PAPER["table_2"]
     lacking = paper | {"azar": Summary(0, 17)}
-    (unjudged,) = sentences(CLAIMS["table_2"], numbers_of(paper), numbers_of(lacking))
+    (unjudged,) = sentences(judged(CLAIMS["table_2"], numbers_of(paper), numbers_of(lacking)))
     assert unjudged.startswith("Could not be judged: ")
     assert unjudged.count("for want of a solution") == len(CLAIMS["table_2"])
 

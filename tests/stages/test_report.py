@@ -10,9 +10,11 @@ import pytest
 
 from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
+from stages.engine.failures import Failure
 from stages.engine.run import run_stage
 from stages.report.case import mean_text
 from stages.report.cohort import statistics_sections
+from stages.tables.statistics import groups, statistics_rows
 from tests.stages.pictured_case import run_figures, write_pictured_case
 
 SECRET = "Jane <script>"
@@ -41,7 +43,7 @@ class Page(HTMLParser):
 def failed_case(folder: Path, name: str, message: str) -> Path:
     path = folder / "segment.h5"
     header = {"stage": "segment", "case": name, "view": "", "laterality": "L", "artefact_id": name}
-    write_artefact(path, header, Fields(status="failed", message=message))
+    write_artefact(path, header, Fields(failure=Failure("segment", "", "failed", message)))
     return path
 
 
@@ -65,7 +67,7 @@ def cohort(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, An
     run_figures(folder / "case1", inputs)
     inputs["figures"] = [folder / "case1" / "figures.h5"]
     (folder / "case2").mkdir()
-    inputs["segment"].append(failed_case(folder / "case2", "case2", f"segment: no breast found {SECRET}"))
+    inputs["segment"].append(failed_case(folder / "case2", "case2", f"no breast found {SECRET}"))
     return folder, inputs
 
 
@@ -120,7 +122,7 @@ def test_a_missing_picture_is_named(cohort: tuple[Path, dict[str, Any]], tmp_pat
 def test_a_cohort_in_which_all_failed(tmp_path: Path) -> None:
     folder = tmp_path / "case2"
     folder.mkdir()
-    inputs = {"segment": [failed_case(folder, "case2", "segment: volume of NaN")]}
+    inputs = {"segment": [failed_case(folder, "case2", "volume of NaN")]}
     text = write_report(tmp_path, inputs, "case\tlaterality\tmr\ncase2\tL\tb.nii\n")
     assert "0 of 1" in text
     assert "volume of NaN" in text
@@ -136,9 +138,26 @@ def test_mean_text(distances: list[float | None], text: str) -> None:
 
 
 def test_statistics_count_and_drop_empty_columns() -> None:
-    keys = ("sd_mm", "median_mm", "max_mm", "within_5_mm_percent", "improvement_percent", "overlap_percent")
+    keys = ("sd_mm", "median_mm", "max_mm", "within_5_mm_percent", "reduction_percent", "overlap_percent")
     paper = ("paper_mean_mm", "paper_sd_mm", "paper_max_mm", "paper_overlap_percent")
     row = dict.fromkeys((*keys, *paper), "") | {"group": "points", "method": "rigid", "n": "3", "of": "4"}
     (section,) = statistics_sections([row | {"mean_mm": "7.40"}])
     assert list(section.columns) == ["method", "n of N", "mean (mm)"]
     assert section.rows == [["rigid", "3 of 4", "7.40"]]
+
+
+def test_the_front_page_compares_means_and_not_ratios() -> None:
+    """One lucky hit of `rigid` makes the paper's mean of ratios -85 %, beside 2.7 mm against 8.7 mm."""
+    distances = {"rigid": (0.3, 12.0, 14.0), "updated": (1.5, 3.0, 3.5)}
+    rows = [
+        {"case": str(i), "views": "CC+MLO", "method": method, "name": "lesion", "distance_mm": d}
+        for method, found in distances.items()
+        for i, d in enumerate(found)
+    ]
+    (group,) = groups([], [*rows, {**rows[0], "case": "4", "distance_mm": None}], [])
+    (section,) = statistics_sections(statistics_rows(group))
+    column = list(section.columns).index("mean below rigid's (%)")
+    assert [row[column] for row in section.rows if row[0] == "updated"] == ["69.6 (3 of 3)"]
+    (updated,) = [row for row in statistics_rows(group) if row["method"] == "updated"]
+    assert float(updated["improvement_percent"]) < 0.0
+    assert not any("better than rigid" in name for name in section.columns)

@@ -11,6 +11,7 @@ from mammoreg.errors import DataError, NotConvergedError
 from stages.engine.artefact import Array, Artefact, Fields
 from stages.engine.contract import SettingsModel, Stage, Subject
 from stages.engine.errors import UserError
+from stages.engine.failures import Failure
 from stages.engine.run import command_line, content_id, execute
 
 
@@ -105,11 +106,92 @@ def test_bad_data_ends_as_an_artefact_that_later_stages_pass_on(tmp_path, mr, nu
     assert Artefact(tmp_path / "tables.h5").value("seen") == [status, status]
 
 
-def test_bugs_raise(tmp_path, mr):
-    mr.write_text("no number")
-    with pytest.raises(ValueError, match="could not convert"):
-        _run(SEGMENT, {"mr": mr}, tmp_path / "segment.h5")
-    assert not (tmp_path / "segment.h5").exists()
+def _stage(name, error, **more):
+    """A stage that ends with an exception; one whose name is a cohort's stage stands for that."""
+
+    def run(inputs, settings, subject):
+        raise error
+
+    return Stage(name, 1, (), Settings, run, **more)
+
+
+def _ended(tmp_path, stage, subject=SUBJECT):
+    execute(stage, "code", {}, tmp_path / "x.h5", {}, subject)
+    return Artefact(tmp_path / "x.h5")
+
+
+def test_origin_is_typed_and_passed_on_unchanged(tmp_path):
+    subject = Subject("c1", "L", "CC")
+    pose = Stage("pose", 1, (), Settings, lambda inputs, settings, subject: _raise(DataError("a: b: c")))
+    execute(pose, "code", {}, tmp_path / "pose.h5", {}, subject)
+    solve = Stage("solve", 1, ("pose",), Settings, pose.run)
+    execute(solve, "code", {"pose": tmp_path / "pose.h5"}, tmp_path / "solve.h5", {}, subject)
+    project = Stage("project", 1, ("solve",), Settings, pose.run)
+    execute(project, "code", {"solve": tmp_path / "solve.h5"}, tmp_path / "project.h5", {}, Subject("c1", "L", "MLO"))
+    for name in ("pose", "solve", "project"):
+        found = Artefact(tmp_path / f"{name}.h5")
+        assert found.failure == Failure("pose", "CC", "failed", "a: b: c")
+        assert (found.attrs["status"], found.attrs["failed_stage"], found.attrs["failed_view"]) == (
+            "failed",
+            "pose",
+            "CC",
+        )
+        assert found.attrs["message"] == "a: b: c"
+
+
+def _raise(error):
+    raise error
+
+
+def test_a_bug_ends_its_case_with_a_message_and_a_traceback_in_the_log(tmp_path, caplog):
+    found = _ended(tmp_path, _stage("mesh", KeyError(f"{tmp_path}: Jane Doe")))
+    assert (found.failure.stage, found.status) == ("mesh", "bug")
+    assert "stopped by a bug (KeyError in tests.stages.test_run.run)" in found.message
+    for secret in (str(tmp_path), "Jane", "Traceback"):
+        assert secret not in found.message
+    assert "KeyError" in caplog.text
+    assert "in run\n" in caplog.text
+
+
+@pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt()])
+def test_want_of_memory_and_an_interrupt_end_the_job(tmp_path, error):
+    with pytest.raises(type(error)):
+        _ended(tmp_path, _stage("mesh", error))
+    assert not (tmp_path / "x.h5").exists()
+
+
+def test_a_bug_in_a_stage_of_the_cohort_ends_the_job(tmp_path):
+    with pytest.raises(KeyError):
+        _ended(tmp_path, _stage("tables", KeyError("x")))
+    assert not (tmp_path / "x.h5").exists()
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (UserError("give the input segment"), "give the input segment"),
+        (PermissionError(13, "Permission denied", "/home/jane/mr.nii"), "mr.nii: Permission denied; mend it"),
+    ],
+)
+def test_what_a_user_can_mend_is_no_bug(tmp_path, error, message):
+    found = _ended(tmp_path, _stage("segment", error))
+    assert found.status == "failed"
+    assert found.failure.message.startswith(message)
+    assert "jane" not in found.message
+
+
+@pytest.mark.parametrize("error", [DataError("no lesion"), ZeroDivisionError()])
+def test_a_stage_without_result_names_what_is_missing(tmp_path, error):
+    def rows(inputs, failure):
+        return {"rows": [{"name": "mass", "status": failure.status}]}
+
+    found = _ended(tmp_path, _stage("localize", error, without_result=rows))
+    assert found.value("rows") == [{"name": "mass", "status": found.status}]
+
+
+def test_a_bug_in_naming_what_is_missing_leaves_the_first_failure(tmp_path):
+    broken = _stage("localize", DataError("no lesion"), without_result=lambda inputs, failure: 1 / 0)
+    assert _ended(tmp_path, broken).message == "localize: no lesion"
 
 
 def test_all_wrong_settings_are_named_at_once(tmp_path, mr):

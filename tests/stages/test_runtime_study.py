@@ -11,6 +11,7 @@ import pytest
 from mammoreg.metrics.distances import breast_scale_mm
 from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
+from stages.engine.failures import Failure
 from stages.engine.run import run_stage
 from stages.studies import chain
 from stages.studies.runtime import stage as runtime
@@ -61,7 +62,7 @@ def fake_run_stage(calls: list[tuple[str, Any]]) -> Any:
     def run(name: str, inputs: dict[str, Any], output: Path, settings: dict[str, Any], subject: Subject) -> None:
         calls.append((name, (inputs, settings, subject)))
         header = synthetic.header(name, subject.laterality, subject.view or "")
-        write_artefact(output, header, Fields(status="failed", message="not run"))
+        write_artefact(output, header, Fields(failure=Failure(name, subject.view or "", "failed", "not run")))
 
     return run
 

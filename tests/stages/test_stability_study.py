@@ -13,6 +13,7 @@ from mammoreg.scenes.design import stability_design
 from mammoreg.scenes.scenario import SCAN
 from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
+from stages.engine.failures import Failure
 from stages.engine.run import run_stage
 from stages.studies.stability import scan_mesh as stability_scan_mesh
 from stages.studies.stability.batch import NO_SCAN, NOT_CHOSEN, batch_of
@@ -94,7 +95,9 @@ def test_table_lists_every_scenario_whether_run_or_not(tmp_path: Path) -> None:
 
 def test_a_scan_that_fails_is_told_in_its_rows(tmp_path: Path) -> None:
     broken = synthetic.header("stability_scan_mesh", "R")
-    write_artefact(tmp_path / "scan.h5", broken, Fields(status="failed", message="no breast found"))
+    write_artefact(
+        tmp_path / "scan.h5", broken, Fields(failure=Failure("stability_scan_mesh", "", "failed", "no breast found"))
+    )
     rows = run_batch(tmp_path, {"only": ["scan-01"]}, stability_scan_mesh=tmp_path / "scan.h5")
     assert rows["scan-01"]["converged"] is None
     assert rows["scan-01"]["message"] == "not run: no breast found"

@@ -150,10 +150,10 @@ def test_lesion_of_a_single_voxel_keeps_its_place() -> None:
 
 def test_what_lies_behind_the_edge_is_not_seen() -> None:
     method = MethodView(turned(0.0), view(0.0, edge_p_mm=-20.0))
-    _pixels, seen = project_landmarks(
-        method, np.array([[0.0, -21.0, 0.0], [0.0, -18.5, 0.0], [0.0, -17.5, 0.0], [0.0, -300.0, 0.0]])
-    )
-    assert seen.tolist() == [True, True, False, False]  # the imaged portion is known to 2 mm
+    depths = (-21.0, -20.05, -19.5, -18.5, -17.5, -300.0)
+    pixels, seen = project_landmarks(method, np.array([[0.0, depth, 0.0] for depth in depths]))
+    assert seen.tolist() == [True, True, False, False, False, False]
+    assert (pixels[seen] >= -0.5).all(), "what is seen lies on a column of the image"
     behind = project_lesion(method, body_from_sphere(np.array([0.0, -5.0, 0.0]), 8.0))
     assert behind.area is None
     assert not behind.seen

@@ -105,6 +105,20 @@ def test_summary_counts_what_is_missing() -> None:
     assert summary.max_mm == 6.0
     assert summary.within_5_mm_percent == pytest.approx(200.0 / 3.0)
     assert summary.improvement_percent == pytest.approx(50.0)
+    assert summary.reduction_percent == pytest.approx(50.0)
+    assert summary.compared == 2
+
+
+def test_a_lucky_hit_of_rigid_rules_the_mean_of_ratios_alone() -> None:
+    summary = summarise([2.0, 2.0, 2.0, 2.0], [0.2, 10.0, 10.0, 0.0])
+    assert summary.improvement_percent == pytest.approx(100 * (1 - (10.0 + 0.2 + 0.2) / 3))
+    assert summary.reduction_percent == pytest.approx(100 * (1 - 2.0 / 5.05))
+    assert summary.compared == 4
+
+
+def test_without_any_rigid_prediction_nothing_is_compared() -> None:
+    summary = summarise([2.0, 3.0], [None, None])
+    assert (summary.improvement_percent, summary.reduction_percent, summary.compared) == (None, None, 0)
 
 
 def test_summary_of_nothing() -> None:

@@ -39,6 +39,8 @@ INPUTS = {
 TAKES_FAILED = ("evaluate", "figures", "tables", "report", "error_vs_runtime", "volunteer", "paper_tables")
 
 TOY_STAGE = '''
+PAPER_TABLES = ("table_2_materials", "table_3_boundary", "table_4_skin", "findings_tables_2_to_4")
+
 import numpy as np
 from pydantic import Field
 from mammoreg.errors import DataError
@@ -55,15 +57,15 @@ def run(inputs, settings, subject):
         if np.isnan(np.asanyarray(nibabel.load(mr).dataobj)).any():
             raise DataError(f"{{mr}}: holds NaN; export the volume again")
     failed = [a for found in inputs.stages.values() for a in found if not a.ok]
-    status = {{"status": failed[0].status, "message": failed[0].message}} if failed and {name!r} == "evaluate" else {{}}
-    from stages.tables.layout import TABLES
+    failure = failed[0].failure if failed and {name!r} == "evaluate" else None
+    from stages.tables.layout import CSV_FILES
     files = {{
         "report": {{"report.html": b"report"}},
-        "tables": {{name: b"table" for name in ("cohort.nc", *(f"{{t.name}}.csv" for t in TABLES))}},
+        "tables": {{name: b"table" for name in ("cohort.nc", *CSV_FILES)}},
         "error_vs_runtime": {{"tables/error_vs_runtime.csv": b"table"}},
-        "paper_tables": {{f"tables/table_{{n}}.csv": b"table" for n in ("2_materials", "3_boundary", "4_skin")}},
+        "paper_tables": {{f"tables/{{n}}.csv": b"table" for n in PAPER_TABLES}},
     }}.get({name!r}, {{}})
-    return Fields(arrays={{"level": Array(np.full(3, settings.level), "1", "level")}}, files=files, **status)
+    return Fields(arrays={{"level": Array(np.full(3, settings.level), "1", "level")}}, files=files, failure=failure)
 
 STAGE = Stage({name!r}, 1, {required!r}, Settings, run, {optional!r}, {takes_failed!r}, {folder!r})
 '''

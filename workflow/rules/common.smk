@@ -17,7 +17,7 @@ from stages.engine.registry import (
     load_stage,
     stage_digest,
 )
-from stages.tables.layout import TABLES as TABLES_WRITTEN
+from stages.tables.layout import CSV_FILES
 
 PROJECT = Path(workflow.basedir)
 
@@ -166,10 +166,7 @@ def settings_of(stage):
 
 def table_files():
     """What rule `tables` leaves beside its artefact; the readable forms of each table come with it."""
-    return [
-        str(RESULTS / "tables" / name)
-        for name in ("cohort.nc", *(f"{t.name}.csv" for t in TABLES_WRITTEN))
-    ]
+    return [str(RESULTS / "tables" / name) for name in ("cohort.nc", *CSV_FILES)]
 
 
 def volunteers():

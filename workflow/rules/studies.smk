@@ -112,8 +112,13 @@ rule paper_tables:
     output:
         named("paper_tables"),
         *(
-            str(RESULTS / "tables" / f"table_{name}.csv")
-            for name in ("2_materials", "3_boundary", "4_skin")
+            str(RESULTS / "tables" / f"{name}.csv")
+            for name in (
+                "table_2_materials",
+                "table_3_boundary",
+                "table_4_skin",
+                "findings_tables_2_to_4",
+            )
         ),
     log:
         log_of("paper_tables"),

@@ -11,9 +11,6 @@ from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import MethodView
 from mammoreg.localization.lesions import LesionArea, LesionBody
 
-IMAGED_PORTION_MM = 2.0
-"""The imaged portion is known to about this much."""
-
 
 @dataclass(frozen=True)
 class ProjectedLesion:
@@ -31,14 +28,9 @@ class ProjectedLesion:
 
 
 def in_image(pixels: NDArray[np.float64], geometry: ViewGeometry) -> NDArray[np.bool_]:
-    """Whether positions (N, 2) as (column, row) lie in the image, so in front of its chest-wall edge too.
-
-    How much of the breast is imaged is an estimate, so places just behind the chest-wall edge count as imaged.
-    """
-    behind = IMAGED_PORTION_MM * geometry.middle_magnification / geometry.pixel_mm
-    low = np.array([-0.5 - behind, -0.5])
+    """Whether positions (N, 2) as (column, row) lie in the image, so in front of its chest-wall edge too."""
     size = np.array([geometry.columns, geometry.rows])
-    return np.asarray(np.all(np.isfinite(pixels) & (pixels >= low) & (pixels < size - 0.5), axis=-1))
+    return np.asarray(np.all(np.isfinite(pixels) & (pixels >= -0.5) & (pixels < size - 0.5), axis=-1))
 
 
 def project_landmarks(method: MethodView, points_breast: Points) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

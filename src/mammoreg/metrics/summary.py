@@ -17,7 +17,10 @@ class Summary:
         of: what has a truth.
         mean_mm, sd_mm, median_mm, max_mm: of the measured ones; the SD is the population's.
         within_5_mm_percent: share of the measured ones up to the paper's limit of 5 mm, included.
-        improvement_percent: mean of 1 - distance / rigid distance over what both measured, as in the paper.
+        improvement_percent: 100 (1 - mean of distance / rigid distance) over what both measured; with this mean of
+            ratios the paper's Tables V and VI give the 78 and 94 % of its section IV. A lucky hit of `rigid` rules it.
+        reduction_percent: 100 (1 - mean distance / mean rigid distance) over the same; not the paper's.
+        compared: what both measured.
     """
 
     n: int
@@ -28,6 +31,8 @@ class Summary:
     max_mm: float | None = None
     within_5_mm_percent: float | None = None
     improvement_percent: float | None = None
+    reduction_percent: float | None = None
+    compared: int | None = None
 
 
 def summarise(distances: Sequence[float | None], rigid: Sequence[float | None] | None = None) -> Summary:
@@ -40,6 +45,7 @@ def summarise(distances: Sequence[float | None], rigid: Sequence[float | None] |
     found = np.array([d for d in distances if d is not None], dtype=float)
     if not len(found):
         return Summary(0, len(distances))
+    improvement, reduction, compared = _against_rigid(distances, rigid) if rigid is not None else (None, None, None)
     return Summary(
         len(found),
         len(distances),
@@ -48,10 +54,19 @@ def summarise(distances: Sequence[float | None], rigid: Sequence[float | None] |
         float(np.median(found)),
         float(found.max()),
         100.0 * float(np.mean(found <= LIMIT_MM)),
-        _improvement(distances, rigid) if rigid is not None else None,
+        improvement,
+        reduction,
+        compared,
     )
 
 
-def _improvement(distances: Sequence[float | None], rigid: Sequence[float | None]) -> float | None:
-    ratios = [d / r for d, r in zip(distances, rigid, strict=True) if d is not None and r]
-    return 100.0 * (1.0 - float(np.mean(ratios))) if ratios else None
+def _against_rigid(
+    distances: Sequence[float | None], rigid: Sequence[float | None]
+) -> tuple[float | None, float | None, int]:
+    """Mean of ratios and ratio of means as improvements in percent, and over how many pairs."""
+    pairs = np.array([(d, r) for d, r in zip(distances, rigid, strict=True) if d is not None and r is not None])
+    if not len(pairs) or not pairs[:, 1].any():
+        return None, None, len(pairs)
+    mine, theirs = pairs.T
+    ratios = mine[theirs > 0.0] / theirs[theirs > 0.0]
+    return 100.0 * (1.0 - float(ratios.mean())), 100.0 * (1.0 - float(mine.mean() / theirs.mean())), len(pairs)

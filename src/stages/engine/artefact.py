@@ -5,8 +5,6 @@ contents give the same bytes: no clock, no host, no absolute path.
 """
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,8 +17,9 @@ from numpy.typing import NDArray
 from mammoreg.geometry import Volume
 from mammoreg.geometry.frames import Frame
 from stages.engine.errors import ArtefactError
+from stages.engine.failures import Failure, Status
+from stages.engine.writing import write_bytes
 
-Status = Literal["ok", "not_converged", "failed"]
 Value = None | bool | int | float | str | list[Any] | dict[str, Any]
 
 AXIS_NAMES = {
@@ -63,15 +62,24 @@ class Fields:
         arrays, volumes: by name; a "/" in a name makes a group.
         values: JSON values by name, their units in the name (`thickness_mm`).
         files: further files by name relative to the stage's folder (pictures, tables), with their bytes.
-        status, message: how the stage ended.
+        failure: where it went wrong first; None if all is well.
     """
 
     arrays: Mapping[str, Array] = field(default_factory=dict)
     volumes: Mapping[str, VolumeField] = field(default_factory=dict)
     values: Mapping[str, Value] = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
-    status: Status = "ok"
-    message: str = ""
+    failure: Failure | None = None
+
+    @property
+    def status(self) -> Status:
+        """How the stage ended."""
+        return self.failure.status if self.failure else "ok"
+
+    @property
+    def message(self) -> str:
+        """What went wrong, with the stage before it; empty if all is well."""
+        return str(self.failure) if self.failure else ""
 
 
 class Artefact:
@@ -83,17 +91,32 @@ class Artefact:
             with h5py.File(path, "r", locking=False) as file:
                 self.attrs: dict[str, str] = {name: _text(value) for name, value in file.attrs.items()}
                 self._values = {name: json.loads(_text(node[()])) for name, node in file["values"].items()}
-            self.stage, self.case, self.message = (self.attrs[key] for key in ("stage", "case", "message"))
+            self.stage, self.case = self.attrs["stage"], self.attrs["case"]
             self.view = self.attrs["view"] or None
             self.laterality = cast(Literal["L", "R"], self.attrs["laterality"])
-            self.status = cast(Status, self.attrs["status"])
+            self.failure = _failure(self.attrs)
         except (OSError, KeyError, ValueError) as error:
             raise ArtefactError(f"{path}: not an artefact of this pipeline; delete it and run again") from error
 
     @property
     def ok(self) -> bool:
         """Whether the stage ended well."""
-        return self.status == "ok"
+        return self.failure is None
+
+    @property
+    def status(self) -> Status:
+        """How its stage, or the first before it that did not end well, ended."""
+        return self.failure.status if self.failure else "ok"
+
+    @property
+    def message(self) -> str:
+        """What went wrong, with the stage before it; empty if all is well."""
+        return str(self.failure) if self.failure else ""
+
+    @property
+    def inputs(self) -> list[str]:
+        """Names of what its stage was given."""
+        return list(json.loads(self.attrs.get("inputs", "{}")))
 
     def names(self) -> list[str]:
         """Names of the arrays, in the order of writing."""
@@ -166,37 +189,24 @@ def write_artefact(path: Path, attrs: Mapping[str, str], fields: Fields) -> None
     Args:
         path: the file; its folder is made.
         attrs: root attributes.
-        fields: contents; `status` and `message` become root attributes.
+        fields: contents; status, message, and the stage and view that failed first become root attributes.
 
     Raises:
         ArtefactError: the file cannot be written (disk full, no permission).
     """
-    write_bytes(path, _image({**attrs, "status": fields.status, "message": fields.message}, fields))
+    write_bytes(path, _image({**attrs, **_outcome(fields)}, fields))
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file atomically through a temporary one in the same folder.
+def _outcome(fields: Fields) -> dict[str, str]:
+    failed = fields.failure or Failure("", "", "ok", "")
+    names = ("status", "message", "failed_stage", "failed_view")
+    return dict(zip(names, (failed.status, failed.message, failed.stage, failed.view), strict=True))
 
-    Raises:
-        ArtefactError: the file cannot be written.
-    """
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o666 & ~_umask())
-        Path(temporary).replace(path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise ArtefactError(
-            f"{path}: cannot be written ({error.strerror or error}); nothing is left behind: "
-            "make room or set the folder's permissions, then run again"
-        ) from error
+
+def _failure(attrs: Mapping[str, str]) -> Failure | None:
+    if attrs["status"] == "ok":
+        return None
+    return Failure(attrs["failed_stage"], attrs["failed_view"], cast(Status, attrs["status"]), attrs["message"])
 
 
 def _image(attrs: Mapping[str, str], fields: Fields) -> bytes:
@@ -287,9 +297,3 @@ def _text(value: Any) -> str:
 def _repeats_its_group(name: str) -> bool:
     parts = name.split("/")
     return len(parts) > 1 and parts[-1] == parts[-2]
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

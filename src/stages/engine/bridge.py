@@ -1,5 +1,6 @@
 """What a rule of the workflow calls: its log, the stage, and a line on the terminal when a case is done."""
 
+import logging
 import os
 import sys
 import traceback
@@ -38,7 +39,7 @@ def run_job(job: Job) -> None:
     def work(terminal: TextIO) -> None:
         print(command_line(stage, inputs, output, settings, subject), flush=True)
         fields = run_stage(stage, inputs, output, settings, subject)
-        if fields.status != "ok" and fields.message.startswith(f"{stage}: "):
+        if fields.failure and (fields.failure.stage, fields.failure.view) == (stage, subject.view or ""):
             where = f"{subject.case} {subject.view}" if subject.view else subject.case
             print(f"{where} {fields.status}: {fields.message}", file=terminal, flush=True)
         if stage == LAST_OF_A_CASE:
@@ -80,6 +81,9 @@ def _inputs(job: Job) -> Mapping[str, Path | list[Path]]:
 
 def _logged(job: Job, work: Callable[[TextIO], None]) -> None:
     with _output_to(Path(job.log[0])) as terminal:
+        # No clock: a log of the same job is the same. Tracebacks of bad data come at the level INFO.
+        logging.basicConfig(stream=sys.stderr, format="%(message)s")
+        logging.getLogger("stages").setLevel(logging.INFO)
         try:
             work(terminal)
         except Exception as error:

@@ -3,17 +3,18 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from stages.engine.artefact import Artefact, write_bytes
+from stages.engine.artefact import Artefact
 from stages.engine.errors import UserError
+from stages.engine.failures import Failure
+from stages.engine.writing import write_bytes
+
+_REMEDY = "Mend the data, or give the row a reason in the column exclude, and run again."
+_BUG_REMEDY = "What was stopped by a bug is tried again after the code has changed, or once its artefact is deleted."
 
 
-def first_failures(artefacts: Iterable[Artefact]) -> dict[tuple[str, str], Artefact]:
-    """By case and message the first artefact that did not end well: later stages repeat its message."""
-    failures: dict[tuple[str, str], Artefact] = {}
-    for artefact in artefacts:
-        if not artefact.ok:
-            failures.setdefault((artefact.case, artefact.message.split(": ", 1)[-1]), artefact)
-    return failures
+def first_failures(artefacts: Iterable[Artefact]) -> list[tuple[str, Failure]]:
+    """Each stage that failed first, with its case before it; what later stages carry on is not told again."""
+    return list(dict.fromkeys((a.case, a.failure) for a in artefacts if a.failure))
 
 
 def write_completion(artefacts: Sequence[Path], output: Path) -> None:
@@ -31,8 +32,8 @@ def write_completion(artefacts: Sequence[Path], output: Path) -> None:
     failures = first_failures(opened)
     if failures:
         count = len({case for case, _ in failures})
-        lines = [f"  {case}{f' {a.view}' if a.view else ''}: {a.message}" for (case, _), a in failures.items()]
+        lines = [f"  {case}{f' {failure.view}' if failure.view else ''}: {failure}" for case, failure in failures]
         head = f"{count} of {len(cases)} cases did not finish; the tables are written and name them:"
-        remedy = "Mend the data, or give the row a reason in the column exclude, and run again."
-        raise UserError("\n".join([head, *lines, remedy]))
+        bugs = any(failure.status == "bug" for _, failure in failures)
+        raise UserError("\n".join([head, *lines, _REMEDY, *([_BUG_REMEDY] if bugs else [])]))
     write_bytes(output, "".join(f"{case}\tok\n" for case in cases).encode())

@@ -10,10 +10,12 @@ from pydantic import BaseModel, ConfigDict
 
 from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Array, Artefact, Fields, Value, VolumeField
+from stages.engine.failures import Failure
 
 __all__ = [
     "Array",
     "Artefact",
+    "Failure",
     "Fields",
     "Inputs",
     "Laterality",
@@ -94,9 +96,10 @@ class Stage:
         settings: the model of its section of the configuration.
         run: the stage itself.
         optional: names that may be given.
-        takes_failed: whether it is called with artefacts whose status is not ok; otherwise their status and message
-            are passed on without calling it.
+        takes_failed: whether it is called with artefacts whose status is not ok; otherwise the first one's failure is
+            passed on without calling it.
         folder: where `Fields.files` go, relative to the artefact's folder; default the stage's name.
+        without_result: the values that stand in an artefact without result, such as rows that name what is missing.
     """
 
     name: str
@@ -107,3 +110,4 @@ class Stage:
     optional: tuple[str, ...] = ()
     takes_failed: bool = False
     folder: str | None = None
+    without_result: Callable[[Inputs, Failure], Mapping[str, Value]] | None = None

@@ -27,6 +27,11 @@ STAGE_MODULES = {name: f"stages.{name}.stage" for name in ("digital", *CASE_STAG
 }
 
 
+def runs_for_one_case(name: str) -> bool:
+    """Whether a stage of the pipeline works on one case, whose trouble is no other's."""
+    return name in CASE_STAGES or name in VIEW_STAGES
+
+
 def load_stage(name: str) -> Stage:
     """Import a stage's module, and nothing else, and return its record."""
     if name not in STAGE_MODULES:

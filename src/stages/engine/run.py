@@ -2,21 +2,25 @@
 
 import hashlib
 import json
+import logging
 import platform
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from mammoreg.errors import DataError, NotConvergedError
-from stages.engine.artefact import Artefact, Fields, write_artefact, write_bytes
+from stages.engine.artefact import Artefact, Fields, Value, write_artefact
 from stages.engine.contract import Inputs, Stage, Subject
 from stages.engine.errors import UserError
-from stages.engine.registry import STAGE_MODULES, load_stage, stage_digest
+from stages.engine.failures import Failure, failure_of
+from stages.engine.registry import STAGE_MODULES, load_stage, runs_for_one_case, stage_digest
+from stages.engine.writing import write_bytes
 
+_LOG = logging.getLogger(__name__)
 LIBRARIES = ("numpy", "scipy", "scikit-fem", "pypardiso", "mkl", "simpleitk", "scikit-image", "h5py")
 
 InputPaths = Mapping[str, Path | Sequence[Path]]
@@ -47,7 +51,7 @@ def execute(
     """As `run_stage`, for a stage record and the digest of its code."""
     model = validated(stage, settings)
     opened, ids = _open(stage, inputs)
-    fields = _passed_on(stage, opened) or _called(stage, opened, model, subject)
+    fields = _outcome(stage, opened, model, subject)
     for name, content in fields.files.items():
         write_bytes(output.parent / (stage.folder or stage.name) / name, content)
     write_artefact(output, _header(stage, code, ids, model, subject), fields)
@@ -111,23 +115,35 @@ def content_id(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _passed_on(stage: Stage, inputs: Inputs) -> Fields | None:
-    """Status and message of the first input that did not end well, which later stages carry instead of computing."""
-    if stage.takes_failed:
-        return None
-    for artefact in (a for found in inputs.stages.values() for a in found):
-        if not artefact.ok:
-            return Fields(status=artefact.status, message=artefact.message)
-    return None
-
-
-def _called(stage: Stage, inputs: Inputs, settings: BaseModel, subject: Subject) -> Fields:
+def _outcome(stage: Stage, inputs: Inputs, settings: BaseModel, subject: Subject) -> Fields:
+    """What the stage comes to, or in its place the failure, of an input or its own, that later stages carry on."""
+    failure = None if stage.takes_failed else _failed_before(inputs)
+    if failure is not None:
+        return _without_result(stage, inputs, failure)
     try:
         return stage.run(inputs, settings, subject)
-    except DataError as error:
-        return Fields(status="failed", message=f"{stage.name}: {_without_folders(str(error), inputs)}")
-    except NotConvergedError as error:
-        return Fields(status="not_converged", message=f"{stage.name}: {_without_folders(str(error), inputs)}")
+    except Exception as error:
+        failure = failure_of(error, stage.name, subject.view or "", of_one_case=runs_for_one_case(stage.name))
+        if failure is None:
+            raise
+        # A user's log tells of bad data too; on a terminal only a bug is worth a traceback.
+        _LOG.log(logging.ERROR if failure.status == "bug" else logging.INFO, "%s", failure, exc_info=True)
+        return _without_result(stage, inputs, replace(failure, message=_without_folders(failure.message, inputs)))
+
+
+def _failed_before(inputs: Inputs) -> Failure | None:
+    """The failure of the first input that did not end well."""
+    return next((a.failure for found in inputs.stages.values() for a in found if a.failure), None)
+
+
+def _without_result(stage: Stage, inputs: Inputs, failure: Failure) -> Fields:
+    """The failure, with the rows that name what could not be had."""
+    values: Mapping[str, Value] = {}
+    try:
+        values = stage.without_result(inputs, failure) if stage.without_result else {}
+    except Exception:
+        _LOG.exception("%s cannot name what is missing", stage.name)
+    return Fields(values=values, failure=failure)
 
 
 def _without_folders(message: str, inputs: Inputs) -> str:

@@ -13,6 +13,8 @@ from stages.engine.artefact import Artefact
 from stages.evaluate.predictions import Row
 from stages.methods import FINE_RAYS, MESH_METHODS, of_view, pose_outline
 
+COMPRESSION_POINTS = 3.0
+"""Beyond this difference of the table's `compression` from what is seen, in percent, the view is marked."""
 SULLIVAN_N = (49.0, 186.0)
 """Range of compression forces measured by Sullivan et al. (paper, section II-B)."""
 
@@ -25,11 +27,13 @@ class Limits:
         outline_p95_mm: 95th percentile of the outline's misfit.
         beam_gap_mm: gap of the beams to a lesion marked in two views.
         min_det_f: smallest volume ratio in the deformed mesh.
+        compression: share of the thickness that the cases table says the plates take away, None where it does not.
     """
 
     outline_p95_mm: float
     beam_gap_mm: float
     min_det_f: float
+    compression: float | None = None
 
 
 def has_outline(pose: Artefact) -> bool:
@@ -52,13 +56,17 @@ def fit_rows(
         beam_gaps: largest gap of the beams to a lesion, by method.
     """
     outline, view = pose_outline(pose, FINE_RAYS) if has_outline(pose) else None, str(pose.view)
+    remarks = [*pose.value("flags"), *_other_compression(pose, results, limits.compression)]
     rows = []
     for method, way in methods.items():
         solution = of_view([a for a in results if a.stage == MESH_METHODS.get(method)], view)
         row: Row = {"view": view, "method": method, **_placed(way.geometry, pose.laterality)}
         row |= {"force_n": _plate_force(solution)} | _fit_columns(outline, block, way)
         row["ncc"] = _number(of_view([a for a in results if a.stage == "project"], view), f"{method}_ncc")
-        row["trust"] = "; ".join([*pose.value("flags"), *_doubts(row, solution, beam_gaps.get(method), limits)])
+        row["outline_step"] = None
+        row |= {name: _number(solution, name) for name in ("penetration_mm", "folded_corners")}
+        row["estimated"] = "; ".join(pose.value("estimated"))
+        row["trust"] = "; ".join([*remarks, *_doubts(row, solution, beam_gaps.get(method), limits)])
         rows.append(row)
     return rows
 
@@ -98,6 +106,18 @@ def _doubts(row: Row, solution: Artefact | None, gap_mm: float | None, limits: L
         f"beams miss each other by {gap_mm or 0:.1f} mm": gap_mm is not None and gap_mm > limits.beam_gap_mm,
     }
     return [text for text, holds in doubts.items() if holds]
+
+
+def _other_compression(pose: Artefact, results: list[Artefact], told: float | None) -> list[str]:
+    """The doubt where the table's compression is not what the mammogram or the second volume shows."""
+    compress = of_view([a for a in results if a.stage == "compress"], str(pose.view))
+    seen = _number(compress, "compression")
+    if told is None or seen is None or not has_outline(pose):
+        return []
+    if abs(told - seen) * 100.0 <= COMPRESSION_POINTS:
+        return []
+    what = "second volume" if pose.view == "3D" else "mammogram"
+    return [f"compression {100 * told:.0f} % in the cases table, {100 * seen:.0f} % in the {what}"]
 
 
 def _plate_force(solution: Artefact | None) -> float | None:

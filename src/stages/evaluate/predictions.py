@@ -15,9 +15,9 @@ Row = dict[str, Any]
 
 
 class Predictions:
-    """The contents of a case's `localize` artefact; of a failed one what there is, perhaps nothing."""
+    """The contents of a case's `localize` artefact; of a failed one what there is; of none nothing."""
 
-    def __init__(self, localize: Artefact) -> None:
+    def __init__(self, localize: Artefact | None) -> None:
         self._artefact = localize
         self._mammogram = {(r["view"], r["method"], r["name"]): r for r in self._value("mammogram_rows", [])}
         self._mr = {(r["method"], r["name"]): r for r in self._value("mr_rows", [])}
@@ -33,7 +33,7 @@ class Predictions:
         names: list[str] = self._value("mr_lesion_names", [])
         places: Mapping[str, list[int]] = self._value("mammogram_area_places", {})
         key = area_key(view, method, names.index(name)) if name in names else ""
-        return read_area(self._artefact, key, places[key]) if key in places else None
+        return read_area(self._opened, key, places[key]) if key in places else None
 
     def in_mr(self, method: str, name: str) -> Row | None:
         """Row of a lesion in the MR volume; None if there is no point."""
@@ -43,11 +43,11 @@ class Predictions:
     def region(self, method: str, name: str) -> Volume | None:
         """The predicted region in the MR volume, LPS; None if the tubes do not meet."""
         key = self._mr_key(method, name)
-        return self._artefact.volume(f"{key}/region") if f"{key}/region" in self._artefact.volume_names() else None
+        return self._opened.volume(f"{key}/region") if f"{key}/region" in self._opened.volume_names() else None
 
     def curve(self, method: str, name: str, view: str) -> Points:
         """A view's beam in the undeformed breast (N, 3), LPS mm."""
-        return self._artefact.array(f"{self._mr_key(method, name)}/curve_{view}", "mm")
+        return self._opened.array(f"{self._mr_key(method, name)}/curve_{view}", "mm")
 
     def in_compressed(self, method: str, name: str) -> Row | None:
         """Row of a landmark in the compressed volume; None if there is no point."""
@@ -62,8 +62,16 @@ class Predictions:
                 gaps[method] = max(gaps.get(method, 0.0), row["beam_gap_mm"])
         return gaps
 
+    @property
+    def _opened(self) -> Artefact:
+        """The artefact, of which a row has been found."""
+        if self._artefact is None:
+            raise LookupError("nothing is predicted without an artefact")
+        return self._artefact
+
     def _mr_key(self, method: str, name: str) -> str:
         return mr_key(method, self._value("mammogram_lesion_names", []).index(name))
 
     def _value(self, name: str, default: Any) -> Any:
-        return self._artefact.value(name) if self._artefact.has(name) else default
+        known = self._artefact is not None and name in self._artefact.value_names()
+        return self._opened.value(name) if known else default

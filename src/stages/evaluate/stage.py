@@ -1,12 +1,10 @@
 """Stage `evaluate`: predictions against the truth that the tables name; it alone reads both sides."""
 
-from typing import Any
-
 from pydantic import Field
 
 from mammoreg.localization.deformation import ReferenceMesh
 from stages.engine.artefact import Fields
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
 from stages.evaluate.elongation import elongation_rows
 from stages.evaluate.fit import Limits, fit_rows
 from stages.evaluate.places import (
@@ -16,8 +14,8 @@ from stages.evaluate.places import (
     lesion_rows_in_mr,
 )
 from stages.evaluate.predictions import Predictions, Row
-from stages.marks import mr_landmarks, mr_lesions, view_areas, view_landmarks, view_lesion_names
-from stages.methods import block_mesh, method_views, of_view
+from stages.marks import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_landmarks, view_lesion_names
+from stages.methods import METHODS, block_mesh, method_views, of_view
 
 IMAGED = ("CC", "MLO")
 _PER_VIEW = ("pose", "compress", "shape", "solve", "project")
@@ -34,42 +32,51 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Compare every prediction that has a truth; one that failed is a row with an empty distance."""
     artefacts = [a for name in ("segment", "mesh", *_PER_VIEW, "localize") for a in inputs.artefacts(name)]
-    failed = [a for a in artefacts if not a.ok]
-    values: dict[str, Any] = {
-        "table_5_rows": _table_5(inputs),
-        "table_6_rows": _table_6(inputs),
-        "landmark_rows": _landmarks(inputs),
+    values = _against_truth(inputs, Predictions(inputs.artefact("localize")))
+    if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
+        values |= _per_view(inputs, settings, subject)
+    return Fields(values=values, failure=next((a.failure for a in artefacts if a.failure), None))
+
+
+def without_result(inputs: Inputs, failure: Failure) -> dict[str, Value]:
+    """Rows with empty distances of all that has a truth."""
+    return _against_truth(inputs, Predictions(None))
+
+
+def _against_truth(inputs: Inputs, predictions: Predictions) -> dict[str, Value]:
+    return {
+        "table_5_rows": _table_5(inputs, predictions),
+        "table_6_rows": _table_6(inputs, predictions),
+        "landmark_rows": _landmarks(inputs, predictions),
         "view_rows": [],
         "elongation_rows": [],
     }
-    if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
-        values |= _per_view(inputs, settings)
-    if failed:
-        return Fields(values=values, status=failed[0].status, message=failed[0].message)
-    return Fields(values=values)
 
 
-def _table_5(inputs: Inputs) -> list[Row]:
-    predictions, lesions = Predictions(inputs.artefact("localize")), mr_lesions(inputs)
+def _table_5(inputs: Inputs, predictions: Predictions) -> list[Row]:
+    lesions = mr_lesion_names(inputs)
     rows: list[Row] = []
     for view in IMAGED:
         pose = of_view(inputs.artefacts("pose"), view)
         names = [name for name in view_lesion_names(inputs, view) if name in lesions]
-        areas = view_areas(inputs, pose) if pose else {}
+        # A mask that stopped `localize` is not opened again: the trouble is told once.
+        compared = pose is not None and any(predictions.in_mammogram(view, m, n) for m in METHODS for n in names)
+        areas = view_areas(inputs, pose) if pose is not None and compared else {}
         rows += lesion_rows_in_mammogram(predictions, view, pose, areas, names)
     return rows
 
 
-def _table_6(inputs: Inputs) -> list[Row]:
-    lesions = mr_lesions(inputs)
+def _table_6(inputs: Inputs, predictions: Predictions) -> list[Row]:
+    known = mr_lesion_names(inputs)
     marked = {view: view_lesion_names(inputs, view) for view in IMAGED}
-    views_of = {name: [view for view in IMAGED if name in marked[view]] for name in lesions}
+    views_of = {name: [view for view in IMAGED if name in marked[view]] for name in known}
     views_of = {name: views for name, views in views_of.items() if views}
-    return lesion_rows_in_mr(Predictions(inputs.artefact("localize")), lesions, views_of)
+    compared = any(predictions.in_mr(method, name) for method in METHODS for name in views_of)
+    return lesion_rows_in_mr(predictions, mr_lesions(inputs) if compared else {}, views_of)
 
 
-def _landmarks(inputs: Inputs) -> list[Row]:
-    predictions, before = Predictions(inputs.artefact("localize")), mr_landmarks(inputs)
+def _landmarks(inputs: Inputs, predictions: Predictions) -> list[Row]:
+    before = mr_landmarks(inputs)
     rows: list[Row] = []
     for view in IMAGED:
         truth = {n: p for n, p in view_landmarks(inputs, view).items() if n in before}
@@ -79,10 +86,15 @@ def _landmarks(inputs: Inputs) -> list[Row]:
     return rows + landmark_rows_in_compressed(predictions, before, truth)
 
 
-def _per_view(inputs: Inputs, settings: Settings) -> dict[str, list[Row]]:
+def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> dict[str, list[Row]]:
     """Fit and elongation of each view whose pose is known."""
     results = [a for name in ("compress", "solve", "project") for a in inputs.artefacts(name)]
-    limits = Limits(settings.outline_p95_limit_mm, settings.beam_gap_limit_mm, settings.min_det_f_limit)
+    limits = Limits(
+        settings.outline_p95_limit_mm,
+        settings.beam_gap_limit_mm,
+        settings.min_det_f_limit,
+        subject.number("compression"),
+    )
     gaps = Predictions(inputs.artefact("localize")).beam_gaps()
     block = block_mesh(inputs.artefact("mesh"))
     reference = ReferenceMesh(block.points, block.hexes())
@@ -92,6 +104,8 @@ def _per_view(inputs: Inputs, settings: Settings) -> dict[str, list[Row]]:
         methods = method_views(pose, reference, results)
         fits += fit_rows(pose, block, methods, results, gaps, limits)
         elongations += elongation_rows(pose, block, methods)
+    for row in (row for row in fits if row["trust"]):
+        print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
     return {"view_rows": fits, "elongation_rows": elongations}
 
 
@@ -109,4 +123,5 @@ STAGE = Stage(
     settings=Settings,
     run=run,
     takes_failed=True,
+    without_result=without_result,
 )

@@ -29,7 +29,7 @@ class Picture:
 
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
-    """Draw and export what the case's stages came to; the status is that of the first one that failed."""
+    """Draw and export what the case's stages came to; what failed first is passed on."""
     # Only this function pays for matplotlib.
     from stages.figures.case import PicturedCase
     from stages.figures.exports import case_exports
@@ -39,9 +39,8 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     files = {f"figures/{picture.name}.png": picture.png.tobytes() for picture in pictures}
     files |= {f"export/{name}": content for name, content in case_exports(case).items()}
     listed = [{"name": p.name, "title": p.title, "caption": p.caption} for p in pictures]
-    failed = [a for name in _ARTEFACTS for a in inputs.artefacts(name) if not a.ok]
-    status, message = (failed[0].status, failed[0].message) if failed else ("ok", "")
-    return Fields(values={"pictures": listed, "files": sorted(files)}, files=files, status=status, message=message)
+    failure = next((a.failure for name in _ARTEFACTS for a in inputs.artefacts(name) if a.failure), None)
+    return Fields(values={"pictures": listed, "files": sorted(files)}, files=files, failure=failure)
 
 
 def _pictures(case: "PicturedCase") -> list[Picture]:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
-from stages.engine.artefact import Artefact, write_bytes
+from stages.engine.artefact import Artefact
+from stages.engine.writing import write_bytes
 
 HEX_NODES = 8
 

@@ -1,18 +1,20 @@
 """Stage `localize`: where each side shows what the other marks. The three directions share no marks."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 
+from mammoreg.errors import DataError
 from mammoreg.geometry import lps_to_breast
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.deformation import ReferenceMesh
 from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Artefact, Fields
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
-from stages.localize.to_compressed import predict_in_compressed, second_volume
-from stages.localize.to_mammogram import predict_in_mammograms
-from stages.localize.to_mr import Anatomy, predict_in_mr
-from stages.localize.views import CaseViews, case_views
-from stages.marks import mr_landmarks, mr_lesions, view_areas, view_lesion_names
+from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
+from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed, second_volume
+from stages.localize.to_mammogram import missing_in_mammograms, predict_in_mammograms
+from stages.localize.to_mr import Anatomy, missing_in_mr, predict_in_mr
+from stages.localize.views import CaseViews, case_views, lost_views
+from stages.marks import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_lesion_names
 from stages.methods import block_mesh
 
 _SKIN_PARTS = 6
@@ -25,9 +27,8 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Predict in every direction for which the case has marks; what a failed view lacks is a row with its message."""
     segment, mesh = inputs.artefact("segment"), inputs.artefact("mesh")
-    for artefact in (segment, mesh):
-        if not artefact.ok:
-            return Fields(status=artefact.status, message=artefact.message)
+    if failure := segment.failure or mesh.failure:
+        return Fields(values=without_result(inputs, failure), failure=failure)
     block = block_mesh(mesh)
     per_view = [a for name in ("pose", "compress", "solve") for a in inputs.artefacts(name)]
     poses = [a for a in per_view if a.stage == "pose"]
@@ -76,14 +77,33 @@ def _landmarks(inputs: Inputs, laterality: Laterality) -> dict[str, Points]:
 
 def _joined(parts: Sequence[Fields], per_view: Sequence[Artefact]) -> Fields:
     """All predictions in one; the first view that failed gives its status, so that the case is named."""
-    failed = next((artefact for artefact in per_view if not artefact.ok), None)
     return Fields(
         arrays={name: array for part in parts for name, array in part.arrays.items()},
         volumes={name: volume for part in parts for name, volume in part.volumes.items()},
         values={name: value for part in parts for name, value in part.values.items()},
-        status=failed.status if failed else "ok",
-        message=failed.message if failed else "",
+        failure=next((artefact.failure for artefact in per_view if artefact.failure), None),
     )
+
+
+def without_result(inputs: Inputs, failure: Failure) -> dict[str, Value]:
+    """Rows without numbers of all that is marked, with what went wrong; marks that cannot be read have none."""
+    message = str(failure)
+    landmarks = _readable(lambda: mr_landmarks(inputs))
+    views = lost_views(inputs.artefacts("pose"), message)
+    names_of = {view: _readable(partial(view_lesion_names, inputs, view)) for view in views.imaged}
+    second = "mr_compressed" in inputs.artefact("segment").inputs
+    return {
+        "mammogram_rows": missing_in_mammograms(views, [*_readable(lambda: mr_lesion_names(inputs)), *landmarks]),
+        "mr_rows": missing_in_mr(names_of, message),
+        "compressed_rows": missing_in_compressed(landmarks, message) if second else [],
+    }
+
+
+def _readable(names: Callable[[], Iterable[str]]) -> list[str]:
+    try:
+        return list(names())
+    except (DataError, OSError):
+        return []
 
 
 STAGE = Stage(
@@ -102,4 +122,5 @@ STAGE = Stage(
     settings=Settings,
     run=run,
     takes_failed=True,
+    without_result=without_result,
 )

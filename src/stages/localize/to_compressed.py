@@ -50,21 +50,41 @@ def predict_in_compressed(
     view = view_in_second_volume(views.methods)
     rows: list[dict[str, Any]] = []
     points = np.array(list(landmarks.values())).reshape(-1, 3)
-    if view is None or not landmarks:
+    if not landmarks:
         return Fields(values={"compressed_rows": rows})
     for method in METHODS:
-        if method == "rigid":
-            carried = second.rigid(points)
-        elif method in views.methods[view]:
-            carried = second.place(views.methods[view][method], drawn_mm(views.poses[view]), points)
+        carried = _carried(views, view, second, method, points)
+        if carried is None:
+            rows += missing_in_compressed(list(landmarks), _trouble(views, view, method), (method,))
         else:
-            carried = np.full(points.shape, np.nan)
-        rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality))
+            rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality))
     return Fields(values={"compressed_rows": rows})
+
+
+def _carried(views: CaseViews, view: str | None, second: SecondVolume, method: str, points: Points) -> Points | None:
+    """Points (N, 3) carried by a method, None where it has no result."""
+    if view is None:
+        return None
+    if method == "rigid":
+        return second.rigid(points)
+    if method not in views.methods[view]:
+        return None
+    return second.place(views.methods[view][method], drawn_mm(views.poses[view]), points)
+
+
+def _trouble(views: CaseViews, view: str | None, method: str) -> str:
+    lost = view or view_in_second_volume({name for name, _ in views.troubles})
+    return views.troubles.get((str(lost), method), "no view shows the compression")
+
+
+def missing_in_compressed(names: Sequence[str], message: str, methods: Sequence[str] = METHODS) -> list[dict[str, Any]]:
+    """Rows without numbers of landmarks by name."""
+    numbers: dict[str, Any] = dict.fromkeys("xyz")
+    return [{"method": method, "name": name, **numbers, "message": message} for method in methods for name in names]
 
 
 def _rows(method: str, names: list[str], points: Points) -> list[dict[str, Any]]:
     return [
-        {"method": method, "name": name, **dict(zip("xyz", map(float, point), strict=True))}
+        {"method": method, "name": name, **dict(zip("xyz", map(float, point), strict=True)), "message": ""}
         for name, point in zip(names, points, strict=True)
     ]

@@ -48,6 +48,12 @@ def predict_in_mammograms(
     return Fields(arrays=arrays, values=values)
 
 
+def missing_in_mammograms(views: CaseViews, names: list[str]) -> Rows:
+    """Rows without numbers of lesions and landmarks by name, in views none of whose methods has a result."""
+    pairs = [(view, method) for view in views.imaged for method in METHODS]
+    return [row for pair in pairs for row in _missing(*pair, names, views.troubles[pair])]
+
+
 def area_key(view: str, method: str, number: int) -> str:
     """Name of the array of a projected lesion, numbered as in `mr_lesion_names`."""
     return f"mammogram/{view}/{method}/lesion{number}"

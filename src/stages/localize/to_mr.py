@@ -70,6 +70,13 @@ def predict_in_mr(
     return Fields(arrays=arrays, volumes=volumes, values={"mr_rows": rows, "mammogram_lesion_names": names})
 
 
+def missing_in_mr(names_of: Mapping[str, list[str]], message: str) -> list[dict[str, Any]]:
+    """Rows without numbers of the lesions that views mark, given by view."""
+    names = dict.fromkeys(name for marked in names_of.values() for name in marked)
+    shown = {name: "+".join(view for view in names_of if name in names_of[view]) for name in names}
+    return [_line(method, name, shown[name], message) for method in METHODS for name in names]
+
+
 def mr_key(method: str, number: int) -> str:
     """Group of a lesion's region and curves, numbered as in `mammogram_lesion_names`."""
     return f"mr/{method}/lesion{number}"

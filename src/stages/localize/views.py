@@ -48,6 +48,11 @@ def case_views(poses: Sequence[Artefact], solutions: Sequence[Artefact], referen
     return CaseViews(well, methods, troubles)
 
 
+def lost_views(poses: Sequence[Artefact], message: str) -> CaseViews:
+    """The views of a case in which nothing could be predicted, all for one reason."""
+    return CaseViews({}, {}, {(str(pose.view), method): message for pose in poses for method in METHODS})
+
+
 def _reason(view: str, method: str, solutions: Sequence[Artefact]) -> str:
     stage = MESH_METHODS.get(method, "pose")
     failed = [s.message for s in solutions if s.view == view and s.stage == stage and not s.ok]

@@ -24,7 +24,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     solutions = [artefact for name in _SOLUTIONS for artefact in inputs.artefacts(name)]
     for artefact in required:
         if not artefact.ok:
-            return Fields(status=artefact.status, message=artefact.message)
+            return Fields(failure=artefact.failure)
     labels, breast_mask, mr = (
         segment.volume(name).to_breast(segment.laterality) for name in ("labels", "breast_mask", "mr")
     )
@@ -43,9 +43,8 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             values[f"{name}_ncc"] = projection_correlation(image, mask, shown, outlined, step)
         if name in MESH_METHODS:
             volumes[f"{name}/mr"] = VolumeField(breast.carry(mr), "1", f"MR volume, method {name}")
-    failed = next((artefact for artefact in solutions if not artefact.ok), None)
-    status, message = (failed.status, failed.message) if failed else ("ok", "")
-    return Fields(arrays=arrays, volumes=volumes, values=values, status=status, message=message)
+    failure = next((artefact.failure for artefact in solutions if artefact.failure), None)
+    return Fields(arrays=arrays, volumes=volumes, values=values, failure=failure)
 
 
 STAGE = Stage(

@@ -50,13 +50,13 @@ def case_page(name: str, laterality: str, artefacts: Sequence[Artefact]) -> Case
         laterality: side of the breast.
         artefacts: all that the case left, in the order of the pipeline.
     """
-    failures = first_failures(artefacts).values()
+    failures = [failure for _, failure in first_failures(artefacts)]
     return CasePage(
         name,
         SIDES[laterality],
         sorted({str(a.view) for a in artefacts if a.view}),
-        next((a.status for a in failures), "ok").replace("_", " "),
-        [f"{a.view}: {a.message}" if a.view else a.message for a in failures],
+        next((str(failure.status) for failure in failures), "ok").replace("_", " "),
+        [f"{failure.view}: {failure}" if failure.view else str(failure) for failure in failures],
         _warnings(artefacts),
         _headline(artefacts),
         any(name.startswith("export/") for a in artefacts if a.has("files") for name in a.value("files")),

@@ -10,6 +10,7 @@ from stages.formats.pages import Section
 from stages.formats.table import Row
 from stages.report.case import SHOWN_METHOD, png_address
 from stages.tables.layout import LANDMARKS, TABLE_5, TABLE_6
+from stages.tables.statistics import reduction_text
 
 Statistics = Sequence[Mapping[str, Any]]
 _COLUMNS = {
@@ -19,7 +20,7 @@ _COLUMNS = {
     "median_mm": "median",
     "max_mm": "max",
     "within_5_mm_percent": "≤ 5 mm (%)",
-    "improvement_percent": "better than rigid (%)",
+    "reduction_percent": "mean below rigid's (%)",
     "overlap_percent": "overlap (%)",
     "paper_mean_mm": "paper: mean",
     "paper_sd_mm": "SD",
@@ -58,12 +59,23 @@ def statistics_sections(statistics: Statistics) -> list[Section]:
         rows = [row for row in statistics if row["group"] == group]
         shown = [key for key in _COLUMNS if any(row[key] for row in rows)]
         header = [_COLUMNS[key] for key in shown]
-        lines = [[*(row[key] for key in shown)] for row in rows]
+        lines = [[reduction_text(row) if key == "reduction_percent" else row[key] for key in shown] for row in rows]
         counts = [f"{row['n']} of {row['of']}" for row in rows]
         for line, count in zip(lines, counts, strict=True):
             line.insert(1, count)
         sections.append(Section(_sentence(group), [header[0], "n of N", *header[1:]], lines))
     return sections
+
+
+def findings_section(findings: Sequence[Sequence[str]]) -> Section:
+    """The paper's statements that this cohort can judge; no row without any truth."""
+    words = {"true": "held", "false": "not held"}
+    rows = [
+        [table.replace("_", " ").replace("table", "Table"), statement, words[held], paper, here]
+        for table, _, statement, held, paper, here in findings
+        if held
+    ]
+    return Section("The paper's statements", ["of", "statement", "here", "paper's numbers", "numbers here"], rows)
 
 
 def _sentence(text: str) -> str:

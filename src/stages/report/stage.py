@@ -7,7 +7,7 @@ from stages.engine.artefact import Artefact, Fields
 from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
 from stages.engine.registry import CASE_STAGES, VIEW_STAGES
 from stages.report.case import case_page
-from stages.report.cohort import cards, errors_picture, excluded_rows, statistics_sections
+from stages.report.cohort import cards, errors_picture, excluded_rows, findings_section, statistics_sections
 from stages.report.provenance import methods_paragraph, settings_section, versions_section
 from stages.tables.layout import TABLES
 
@@ -34,6 +34,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         excluded=excluded_rows(cohort),
         errors=errors_picture(artefacts, statistics),
         statistics=statistics_sections(statistics),
+        findings=findings_section(inputs.artefact("tables").value("findings")),
         tables=[(table.title, f"tables/{table.name}") for table in TABLES],
         methods=methods_paragraph(artefacts),
         settings=settings_section(_with_settings(inputs, artefacts)),

@@ -39,6 +39,7 @@ PREDICTIONS_COMPRESSED = Table(
     "compressed_rows",
     ("method", "name"),
     {"x": 2, "y": 2, "z": 2},
+    ("message",),
 )
 VIEWS = Table(
     "views",
@@ -53,8 +54,11 @@ VIEWS = Table(
         "outline_p95_mm": 2,
         "outline_dice": 3,
         "ncc": 3,
+        "outline_step": 1,
+        "penetration_mm": 2,
+        "folded_corners": 0,
     },
-    ("trust",),
+    ("estimated", "trust"),
 )
 TABLE_5 = Table(
     "table_5_mammogram",
@@ -99,3 +103,9 @@ TABLES = (
     ELONGATION,
     LANDMARKS,
 )
+
+FAILURES = ("case", "view", "stage", "status", "message")
+"""Columns of `failures.csv`: a row for each stage that failed first."""
+
+CSV_FILES = (*(f"{table.name}.csv" for table in TABLES), "summary.csv", "findings.csv", "failures.csv")
+"""What stage `tables` writes beside `cohort.nc` and the readable forms."""

@@ -4,14 +4,16 @@ from collections.abc import Mapping, Sequence
 
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.completion import first_failures
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject
+from stages.formats.findings import FINDINGS
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
-from stages.tables.layout import LANDMARKS, TABLE_5, TABLE_6, TABLES
+from stages.tables.findings import cohort_findings
+from stages.tables.layout import FAILURES, LANDMARKS, TABLE_5, TABLE_6, TABLES
 from stages.tables.netcdf import cohort_netcdf
 from stages.tables.statistics import Group, groups, incomplete, readable_rows, statistics_rows
 
-_INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate")
+_INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate", "figures")
 
 
 class Settings(SettingsModel):
@@ -23,21 +25,27 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     artefacts = [artefact for name in _INPUTS for artefact in inputs.artefacts(name)]
     rows_of = {table.name: table.rows(artefacts) for table in TABLES}
     found = groups(*(rows_of[table.name] for table in (TABLE_5, TABLE_6, LANDMARKS)))
-    failures = _failures(artefacts)
-    files: dict[str, bytes] = {"cohort.nc": cohort_netcdf(rows_of)}
+    failures = first_failures(artefacts)
+    files: dict[str, bytes] = {"cohort.nc": cohort_netcdf(rows_of, _outcomes(artefacts, failures))}
     for table in TABLES:
-        files |= _files(table, rows_of[table.name], [g for g in found if g.table == table.name], failures)
+        files |= _files(table, rows_of[table.name], [g for g in found if g.table == table.name], _texts(failures))
     statistics = [row for group in found for row in statistics_rows(group)]
+    findings = cohort_findings(found)
     overview = section_of("", statistics)
     files["summary.csv"] = as_csv(overview.columns, overview.rows)
-    return Fields(files=files, values={"statistics": statistics, "failures": failures})
+    files["findings.csv"] = as_csv(FINDINGS, findings)
+    files["failures.csv"] = as_csv(FAILURES, [[case, f.view, f.stage, f.status, f.message] for case, f in failures])
+    return Fields(files=files, values={"statistics": statistics, "findings": findings, "failures": _texts(failures)})
 
 
-def _failures(artefacts: Sequence[Artefact]) -> list[str]:
-    return [
-        f"{case}{f' {artefact.view}' if artefact.view else ''} {artefact.status}: {artefact.message}"
-        for (case, _), artefact in first_failures(artefacts).items()
-    ]
+def _texts(failures: Sequence[tuple[str, Failure]]) -> list[str]:
+    return [f"{case}{f' {each.view}' if each.view else ''} {each.status}: {each}" for case, each in failures]
+
+
+def _outcomes(artefacts: Sequence[Artefact], failures: Sequence[tuple[str, Failure]]) -> dict[str, tuple[str, str]]:
+    """Status and message of every case, those of its first failure."""
+    outcomes = {artefact.case: ("ok", "") for artefact in artefacts}
+    return outcomes | {case: (failure.status, str(failure)) for case, failure in reversed(failures)}
 
 
 def _files(table: Table, rows: Sequence[Row], found: Sequence[Group], failures: Sequence[str]) -> Mapping[str, bytes]:

@@ -4,12 +4,46 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mammoreg.metrics.paper import METHODS, TABLE_3, TABLE_5, TABLE_6, paper_overlap_percent, paper_summary
+from mammoreg.metrics.paper import (
+    METHODS,
+    TABLE_3,
+    TABLE_5,
+    TABLE_6,
+    PaperRow,
+    paper_overlap_percent,
+    paper_summary,
+)
 from mammoreg.metrics.summary import Summary, summarise
 from stages.formats.table import Row
 
-COLUMNS = ("n", "of", "mean_mm", "sd_mm", "median_mm", "max_mm", "within_5_mm_percent", "improvement_percent")
-_DECIMALS = (None, None, 2, 2, 2, 2, 1, 1)
+COLUMNS = {
+    "n": None,
+    "of": None,
+    "mean_mm": 2,
+    "sd_mm": 2,
+    "median_mm": 2,
+    "max_mm": 2,
+    "within_5_mm_percent": 1,
+    "improvement_percent": 1,
+    "reduction_percent": 1,
+    "compared": None,
+}
+"""Statistics with their decimals."""
+IN_MAMMOGRAMS = "lesions in the mammograms"
+IN_MR = "lesions in the MR volumes, from two views"
+IN_COMPRESSED = "landmarks in the compressed volume"
+
+
+def _printed(table: tuple[PaperRow, ...]) -> dict[str, tuple[Summary, float | None]]:
+    return {method: (paper_summary(table, method), paper_overlap_percent(table, method)) for method in METHODS}
+
+
+PRINTED: Mapping[str, Mapping[str, tuple[Summary, float | None]]] = {
+    "table_3": {method: (summary, None) for method, summary in TABLE_3.items()},
+    "table_5": _printed(TABLE_5),
+    "table_6": _printed(TABLE_6),
+}
+"""The paper's statistics by table and method, and the mean overlap in percent where it gives one."""
 
 
 @dataclass(frozen=True)
@@ -33,28 +67,33 @@ def groups(table_5: Sequence[Row], table_6: Sequence[Row], landmarks: Sequence[R
     """The groups that are summarised; only two-view lesions enter Table VI's means."""
     both = [row for row in table_6 if "+" in row["views"]]
     one = [row for row in table_6 if "+" not in row["views"]]
-    printed_5 = {m: (paper_summary(TABLE_5, m), paper_overlap_percent(TABLE_5, m)) for m in METHODS}
-    printed_6 = {m: (paper_summary(TABLE_6, m), paper_overlap_percent(TABLE_6, m)) for m in METHODS}
-    volunteer = {method: (summary, None) for method, summary in TABLE_3.items()}
     carried = [row for row in landmarks if row["view"] == "3D"]
     projected = [row for row in landmarks if row["view"] != "3D"]
     found = [
-        Group("table_5_mammogram", "lesions in the mammograms", table_5, printed_5),
-        Group("table_6_mr", "lesions in the MR volumes, from two views", both, printed_6),
+        Group("table_5_mammogram", IN_MAMMOGRAMS, table_5, PRINTED["table_5"]),
+        Group("table_6_mr", IN_MR, both, PRINTED["table_6"]),
         Group("table_6_mr", "lesions in the MR volumes, from one view", one, {}),
         Group("landmarks", "landmarks in the mammograms", projected, {}),
-        Group("landmarks", "landmarks in the compressed volume", carried, volunteer),
+        Group("landmarks", IN_COMPRESSED, carried, PRINTED["table_3"]),
     ]
     return [group for group in found if group.rows]
 
 
-def statistics_rows(group: Group) -> list[dict[str, Any]]:
-    """One row per method: the statistics, the mean overlap, and the paper's numbers with `paper_` before them."""
+def summaries(group: Group) -> dict[str, Summary]:
+    """Statistics by method."""
     rigid = {_subject(row): row["distance_mm"] for row in group.rows if row["method"] == "rigid"}
-    rows = []
+    found = {}
     for method in dict.fromkeys(row["method"] for row in group.rows):
         mine = [row for row in group.rows if row["method"] == method]
-        summary = summarise([r["distance_mm"] for r in mine], [rigid.get(_subject(r)) for r in mine])
+        found[method] = summarise([r["distance_mm"] for r in mine], [rigid.get(_subject(r)) for r in mine])
+    return found
+
+
+def statistics_rows(group: Group) -> list[dict[str, Any]]:
+    """One row per method: the statistics, the mean overlap, and the paper's numbers with `paper_` before them."""
+    rows = []
+    for method, summary in summaries(group).items():
+        mine = [row for row in group.rows if row["method"] == method]
         overlaps = [r["overlap_percent"] for r in mine if r.get("overlap_percent") is not None]
         row = {"table": group.table, "group": group.label, "method": method, **_texts(summary, "")}
         row["overlap_percent"] = f"{sum(overlaps) / len(overlaps):.1f}" if overlaps else ""
@@ -81,10 +120,17 @@ def _words(row: Mapping[str, str], prefix: str) -> dict[str, str]:
         "median, mm": of("median_mm"),
         "maximum, mm": of("max_mm"),
         "within 5 mm, %": of("within_5_mm_percent"),
-        "nearer than rigid, %": of("improvement_percent"),
+        "improvement over rigid, mean of ratios (the paper's), %": of("improvement_percent"),
+        "mean below that of rigid (ours), %": reduction_text(row, prefix),
         "overlap, %": of("overlap_percent"),
     }
     return {f"{'paper: ' if prefix else ''}{name}": text for name, text in words.items()}
+
+
+def reduction_text(row: Mapping[str, str], prefix: str = "") -> str:
+    """By how much a mean lies below that of `rigid`, in percent, with how many of all were compared."""
+    percent, compared, of = (row[f"{prefix}{name}"] for name in ("reduction_percent", "compared", "of"))
+    return f"{percent} ({compared} of {of})" if percent else ""
 
 
 def incomplete(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -97,8 +143,7 @@ def incomplete(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _texts(summary: Summary | None, prefix: str) -> dict[str, str]:
-    values = [getattr(summary, name) if summary else None for name in COLUMNS]
-    return {f"{prefix}{name}": _fixed(v, d) for name, v, d in zip(COLUMNS, values, _DECIMALS, strict=True)}
+    return {f"{prefix}{name}": _fixed(getattr(summary, name, None), digits) for name, digits in COLUMNS.items()}
 
 
 def _fixed(value: float | None, decimals: int | None) -> str:

@@ -3,60 +3,27 @@
 Numbers are looked up by texts such as "plate mean", "plate max", "none lateral mean", all in mm.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
+from mammoreg.metrics.findings import Claim, Finding, Numbers, lower
 from mammoreg.metrics.paper import BEFORE, TABLE_2, TABLE_3, TABLE_4
 from mammoreg.metrics.summary import LIMIT_MM, Summary
 
-Numbers = Mapping[str, float]
 LINEAR = ("bakic", "lorenzen")
 SKINS = ("attached", "sliding", "adherent")
 ENCLOSING = ("sliding", "adherent")
 
 
-@dataclass(frozen=True)
-class Claim:
-    """A statement of the paper.
-
-    Attributes:
-        text: the statement.
-        holds: whether numbers agree with it.
-        shown: the numbers that decide, in words.
-    """
-
-    text: str
-    holds: Callable[[Numbers], bool]
-    shown: Callable[[Numbers], str]
-
-
-def numbers_of(summaries: Mapping[str, Summary]) -> dict[str, float]:
-    """Mean, SD and maximum of each summary to 0.1 mm, as the paper prints them; what is unknown is left out."""
-    found: dict[str, float] = {}
-    for name, summary in summaries.items():
-        values = {"mean": summary.mean_mm, "sd": summary.sd_mm, "max": summary.max_mm}
-        found |= {f"{name} {what}": round(value, 1) for what, value in values.items() if value is not None}
-    return found
-
-
-def sentences(claims: Sequence[Claim], paper: Numbers, here: Numbers) -> list[str]:
+def sentences(findings: Sequence[Finding]) -> list[str]:
     """One sentence each on what agrees, what does not and what could not be judged; none where it would be empty."""
     texts: dict[str, list[str]] = {"Agrees with the paper": [], "Does not agree": [], "Could not be judged": []}
-    for claim in claims:
-        try:
-            head = "Agrees with the paper" if claim.holds(here) else "Does not agree"
-            texts[head].append(f"{claim.text} (paper: {claim.shown(paper)}; here: {claim.shown(here)})")
-        except KeyError:
-            texts["Could not be judged"].append(f"{claim.text}, for want of a solution")
+    for finding in findings:
+        if finding.held is None:
+            texts["Could not be judged"].append(f"{finding.statement}, for want of a solution")
+        else:
+            head = "Agrees with the paper" if finding.held else "Does not agree"
+            texts[head].append(f"{finding.statement} (paper: {finding.paper}; here: {finding.here})")
     return [f"{head}: {'; '.join(found)}." for head, found in texts.items() if found]
-
-
-def _lower(name: str, than: str, what: str) -> tuple[Callable[[Numbers], bool], Callable[[Numbers], str]]:
-    """Whether a number of one variation is below that of another."""
-    return (
-        lambda n: n[f"{name} {what}"] < n[f"{than} {what}"],
-        lambda n: f"{n[f'{than} {what}']:.1f} to {n[f'{name} {what}']:.1f} mm",
-    )
 
 
 def _listed(n: Numbers, names: Sequence[str], what: str) -> str:
@@ -103,12 +70,12 @@ MATERIAL_CLAIMS = (
 )
 
 BOUNDARY_CLAIMS = (
-    Claim("additional points lower the mean", *_lower("additional_points", "plate", "mean")),
-    Claim("additional points lower the maximum", *_lower("additional_points", "plate", "max")),
-    Claim("updated boundary conditions lower the mean", *_lower("updated", "plate", "mean")),
+    Claim("additional points lower the mean", *lower("additional_points", "plate", "mean")),
+    Claim("additional points lower the maximum", *lower("additional_points", "plate", "max")),
+    Claim("updated boundary conditions lower the mean", *lower("updated", "plate", "mean")),
     Claim(
         "updated boundary conditions lower the maximum further than additional points",
-        *_lower("updated", "additional_points", "max"),
+        *lower("updated", "additional_points", "max"),
     ),
     Claim(
         "updated boundary conditions gain at least half of what additional points gain in the mean",
@@ -133,8 +100,8 @@ SKIN_CLAIMS = (
         lambda n: max(n[f"{skin} lateral max"] for skin in SKINS) < n["none lateral max"],
         lambda n: f"{n['none lateral max']:.1f} to {_listed(n, SKINS, 'lateral max')} mm",
     ),
-    Claim("attached skin lowers the mean distance", *_lower("attached", "none", "mean")),
-    Claim("attached skin lowers the maximum", *_lower("attached", "none", "max")),
+    Claim("attached skin lowers the mean distance", *lower("attached", "none", "mean")),
+    Claim("attached skin lowers the maximum", *lower("attached", "none", "max")),
     Claim(
         "enclosing membranes raise the mean distance",
         lambda n: min(n[f"{skin} mean"] for skin in ENCLOSING) > n["none mean"],

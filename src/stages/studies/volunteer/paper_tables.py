@@ -3,15 +3,18 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from mammoreg.metrics.findings import Finding, judged, numbers_of
 from mammoreg.metrics.summary import Summary, summarise
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.formats.findings import FINDINGS, findings_rows
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
-from stages.studies.volunteer.paper_sentences import CLAIMS, PAPER, numbers_of, sentences
+from stages.studies.volunteer.paper_sentences import CLAIMS, PAPER, sentences
 from stages.studies.volunteer.stage import REFERENCES
 
 STUDY = "volunteer"
+FINDINGS_FILE = "findings_tables_2_to_4.csv"
 LATERAL = " lateral"
 TABLES = (
     Table(
@@ -68,6 +71,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     volunteers = inputs.artefacts(STUDY)
     files: dict[str, bytes] = {}
     said: dict[str, Any] = {}
+    findings: list[list[str]] = []
     for table in TABLES:
         rows = table.rows(volunteers)
         cases = {a.case: a for a in volunteers if any(row["case"] == a.case for row in rows)}
@@ -82,6 +86,8 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             f"tables/{table.name}.html": as_html(table.title, first, sections),
         }
         said[table.name] = {a.case: _said(table, a) for a in cases.values()}
+        findings += [row for a in cases.values() for row in findings_rows(table.name, a.case, _findings(table, a))]
+    files[f"tables/{FINDINGS_FILE}"] = as_csv(FINDINGS, findings)
     return Fields(files=files, values={"sentences": said})
 
 
@@ -102,9 +108,13 @@ def _summaries(table: Table, artefact: Artefact) -> dict[str, Summary]:
     return found
 
 
-def _said(table: Table, artefact: Artefact) -> list[str]:
+def _findings(table: Table, artefact: Artefact) -> list[Finding]:
     here, paper = _summaries(table, artefact), PAPER[_key(table)]
-    return sentences(CLAIMS[_key(table)], numbers_of(paper), numbers_of(here))
+    return judged(CLAIMS[_key(table)], numbers_of(paper), numbers_of(here))
+
+
+def _said(table: Table, artefact: Artefact) -> list[str]:
+    return sentences(_findings(table, artefact))
 
 
 def _missing(table: Table, artefact: Artefact) -> list[str]:
