@@ -8,7 +8,6 @@ from mammoreg.geometry import breast_to_plate
 from stages.compress import gland_map as tissue_map
 from stages.compress.record import resumed
 from stages.engine.artefact import Artefact
-from stages.engine.errors import UserError
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, pressed, run, write_pose, write_start
 
 
