@@ -1,5 +1,6 @@
 """A synthetic breast whose compression is affine, as the artefacts of the stages before `localize` hold it."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,11 +87,18 @@ def write_mesh(path: Path, laterality: Laterality) -> Path:
     return path
 
 
-def write_pose(path: Path, laterality: Laterality, view: str, flips: tuple[bool, bool], outlined: bool) -> Path:
+def write_pose(
+    path: Path,
+    laterality: Laterality,
+    view: str,
+    flips: tuple[bool, bool],
+    outlined: bool,
+    flags: Sequence[str] = (),
+) -> Path:
     g = geometry(view)
     placed = {name: getattr(g, name) for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")}
     values: dict[str, Any] = {**placed, **{f"rigid_{name}": value for name, value in placed.items()}}
-    values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": []}
+    values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": list(flags)}
     values |= {"estimated": ["source_detector_mm"]}
     values |= {"drawn_mm": [0.0, 0.0, 0.0]}
     values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}

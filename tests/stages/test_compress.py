@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from mammoreg.fem.parts.plane_ties import PlaneTies
-from mammoreg.geometry import breast_to_plate
+from mammoreg.geometry import breast_to_plate, lps_to_breast
+from mammoreg.meshing.locate import Locator
 from stages.compress import gland_map as tissue_map
 from stages.compress.record import resumed
-from stages.engine.artefact import Artefact
-from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, pressed, run, write_pose, write_start
+from stages.engine.artefact import Artefact, Fields, VolumeField, write_artefact
+from stages.engine.contract import Inputs
+from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MU, pressed, run, write_pose, write_start
+from tests.stages.synthetic_case import header
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +87,21 @@ def test_fixed_back_stays_and_costs_force(inputs, plain, tmp_path):
     assert fixed.value("force_n") > plain.value("force_n") > free.value("force_n")
 
 
+@pytest.mark.parametrize("layer_mm", [15.0, 60.0])
+def test_back_slides_against_the_shear_of_the_layer_behind_it(inputs, tmp_path, layer_mm):
+    """A layer of the tissue's own shear modulus, sheared by the back's motion, holds mu |u|^2 / 2 L on each area."""
+    got = _with(inputs, tmp_path, back_layer_mm=layer_mm)
+    lift = [0.0, 0.0, got.value("lift_mm")]
+    motion = (_nodes(got) - lift - breast_to_plate(MESH.points, ANGLE))[MESH.back_quads()]
+    np.testing.assert_allclose(motion[..., 1], 0.0, atol=0.01, err_msg="the back of this breast is a plane")
+    faces = MESH.points[MESH.back_quads()]
+    area = 0.5 * np.linalg.norm(np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1]), axis=1)
+    sheared = (motion**2).sum(axis=-1).mean(axis=1)
+    assert sheared.max() > 1.0, "the back must slide for this test to say anything"
+    energy = 0.5 * MU / layer_mm * float(area @ sheared)  # kPa mm3 = uJ; the report has mJ
+    assert got.value("part_energies_mj")["BackSprings"] == pytest.approx(1e-3 * energy, rel=0.02)
+
+
 def test_plates_without_end_press_harder(inputs, plain, tmp_path):
     endless = _with(inputs, tmp_path, plates_end=False)
     assert endless.value("force_n") > 1.1 * plain.value("force_n")
@@ -133,6 +151,23 @@ def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain,
     without = _with(inputs, tmp_path, material="fat_and_gland")
     assert without.status == "failed"
     assert "needs the input segment; give it with --in segment=path" in without.message
+
+
+def test_skin_counts_as_tissue_that_is_not_gland(segment, inputs, tmp_path):
+    told = Artefact(segment)
+    labels = told.volume("labels")
+    coded = labels.with_data(np.where(labels.data == 1, 3, labels.data).astype(np.uint8))  # all but the gland is skin
+    skinned = tmp_path / "skin.h5"
+    write_artefact(skinned, header("segment", "R"), Fields(volumes={"labels": VolumeField(coded, "1", "labels")}))
+    artefacts = {"segment": [Artefact(skinned)], "mesh": [Artefact(inputs["mesh"])]}
+    found = tissue_map.gland_share(Inputs(stages=artefacts))
+    inside = np.argwhere(coded.data > 0)
+    element, _, kept = Locator(MESH.points, MESH.hexes()).locate(lps_to_breast(coded.to_world(inside), "R"))
+    gland = (coded.data[tuple(inside.T)] == 2)[kept]
+    counts = np.bincount(element[kept], minlength=len(found))
+    share = np.bincount(element[kept], weights=gland, minlength=len(found)) / counts
+    assert 0.2 < share.max() < 0.8
+    np.testing.assert_allclose(found, share, atol=0.04)
 
 
 @pytest.mark.parametrize("material", ["wellman", "bakic"])

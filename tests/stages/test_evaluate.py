@@ -106,6 +106,19 @@ def test_what_speaks_against_a_view(tmp_path: Path) -> None:
     assert "outline misfit" in rows_of(found, "view_rows", "rigid")[0]["trust"]
 
 
+def test_doubts_of_the_pose_stand_before_every_method_s_own(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    doubts = {"CC": ["angle not determined by the image", "polarity assumed"], "MLO": []}
+    for path, (view, flags) in zip(inputs["pose"], doubts.items(), strict=True):
+        synthetic.write_pose(path, "R", view, (False, False), outlined=True, flags=flags)
+    rows = evaluated(tmp_path, inputs, {"min_det_f_limit": 0.95}).value("view_rows")
+    assert {row["method"] for row in rows} == {"rigid", "scaling", "plate", "updated"}
+    for row in rows:
+        own = ["low Jacobian 0.90"] if row["method"] in ("plate", "updated") else []
+        told = [text for text in row["trust"].split("; ") if text and "outline misfit" not in text]
+        assert told == [*doubts[row["view"]], *own]
+
+
 def test_elongation_is_the_closed_form(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path, views=("3D",), compressed=True)
     stretch = synthetic.SHRINK**-0.5 - 1.0

@@ -5,8 +5,11 @@ import pytest
 
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.plates.closing import Closing
+from mammoreg.geometry import breast_to_lps
 from mammoreg.geometry.frames import plate_rotation
+from stages.engine.artefact import Array, Fields, write_artefact
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MIDDLE, ROW, pressed, run, write_mammogram, write_start
+from tests.stages.synthetic_case import header
 
 
 @pytest.fixture(scope="module")
@@ -103,6 +106,20 @@ def test_case_with_a_compression_alone(tmp_path):
     assert (got.value("angle_deg"), got.value("angle_determined")) == (0.0, False)
     assert np.linalg.det(got.array("scaling_matrix", "1")) == pytest.approx(1.0)
     assert not got.has("outline")
+
+
+def test_edge_without_an_image_lies_in_front_of_most_but_not_all_of_a_bent_back(tmp_path):
+    points, back = MESH.points.copy(), MESH.back_nodes()
+    points[:, 1] += 0.4 * (points[:, 2] - points[back, 2].min()) * (1.0 + points[:, 1] / 78.0)
+    start = write_start(tmp_path)
+    arrays = {"points": Array(breast_to_lps(points, "R"), "mm", "nodes")}
+    write_artefact(start["mesh"], header("mesh", "R"), Fields(arrays=arrays, values={"n": MESH.n}))
+    got = run("pose", tmp_path / "out", start, view="3D", row={"compression": "0.3"})
+    assert got.ok, got.message
+    faces = points[MESH.back_quads()]
+    area = 0.5 * np.linalg.norm(np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1]), axis=1)
+    behind = area[faces[..., 1].mean(axis=1) > got.value("edge_p_mm")].sum() / area.sum()
+    assert 0.6 < behind < 0.9
 
 
 def test_case_with_nothing_to_go_by_fails(tmp_path):

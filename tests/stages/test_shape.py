@@ -1,5 +1,9 @@
 """Stage `shape`: from the compression and an outline to the surface of the breast."""
 
+import json
+import shutil
+
+import h5py
 import numpy as np
 import pytest
 
@@ -55,6 +59,25 @@ def test_softer_ties_leave_more_of_the_misfit_after_one_round(inputs, tmp_path):
         for k in (0.5, 20.0)
     )
     assert soft > 2.0 * stiff
+
+
+def test_ties_stiffen_with_the_tissue_that_they_draw(inputs, tmp_path):
+    """Ties of stiffness 2 draw tissue that has become three times as stiff as ties of 6 draw what is as at first."""
+    stiffened = tmp_path / "stiffened.h5"
+    shutil.copy(inputs[1].path, stiffened)
+    with h5py.File(stiffened, "r+") as file:
+        values = file["values"]
+        assert json.loads(values["stiffness_ratio"][()]) == 1.0
+        del values["stiffness_ratio"]
+        values["stiffness_ratio"] = json.dumps(3.0)
+    pose = write_pose(tmp_path / "wide.h5", wider_mm=2.0)
+    drawn = [
+        run("shape", tmp_path / "out", inputs[0] | {"pose": pose, "compress": path}, {"tie_stiffness": k, "rounds": 1})
+        for path, k in ((stiffened, 2.0), (inputs[1].path, 6.0), (inputs[1].path, 2.0))
+    ]
+    one, same, softer = (got.array("deformed", "mm") for got in drawn)
+    np.testing.assert_allclose(one, same, atol=1e-9)
+    assert np.abs(softer - same).max() > 0.1, "the stiffness must count for this test to say anything"
 
 
 def test_image_height_does_not_matter(inputs, tmp_path):

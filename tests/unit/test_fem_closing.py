@@ -132,6 +132,19 @@ def test_soft_contact_alone_lets_more_pass(closed: Closed) -> None:
     assert closed.iterations < 2 * soft.iterations
 
 
+def test_breast_that_damping_alone_has_stopped_is_not_at_rest() -> None:
+    """Heavy damping keeps a step below any tolerance while plates that came nearer still push the tissue."""
+    mesh = breast(3)
+    rested = closing(mesh).close(GAP)
+    assert rested.report is not None
+    assert rested.report.unbalance < 1e-4
+    closer = closing(mesh).further(rested, GAP - 1.0)
+    assert closer.force_n[0] > 1.02 * rested.force_n[0]
+    damped = closing(mesh, options=ClosingOptions(damping=1e4, rests=1))
+    with pytest.raises(NotConvergedError, match="balance"):
+        damped.further(rested, GAP - 1.0)
+
+
 def test_plates_wider_than_the_breast_are_refused() -> None:
     with pytest.raises(NotConvergedError, match="does not compress a breast"):
         closing(breast()).close(300.0)

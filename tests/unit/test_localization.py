@@ -12,7 +12,7 @@ from mammoreg.localization.deformation import AffineDeformation, MeshDeformation
 from mammoreg.localization.grid import BreastGrid, BreastInView
 from mammoreg.localization.lesions import LesionArea, area_from_disc, area_from_mask, body_from_mask, body_from_sphere
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
-from mammoreg.localization.to_mr import closest_approach, halfway, locate_in_breast
+from mammoreg.localization.to_mr import back_projected_region, closest_approach, halfway, locate_in_breast
 from mammoreg.meshing.block import BlockMesh
 
 PIXEL_MM = 0.2
@@ -180,6 +180,23 @@ def test_two_views_give_back_the_sphere(centre: list[float], diameter: float) ->
     covered = np.count_nonzero(radius <= 0.5 * diameter) * found.region.voxel_mm3
     assert covered == pytest.approx(ball, rel=0.12)
     assert len(cells) * found.region.voxel_mm3 < 2.2 * ball
+
+
+@pytest.mark.parametrize("shrink", [1.0, 0.5])
+def test_region_holds_every_cell_that_appears_in_both_lesions(shrink: float) -> None:
+    """A coarse cell is passed over only where none of its parts can lie in the lesion, also where tissue spreads."""
+    views = {n: BreastInView(m, BreastGrid(half_ball(32.0, 4.0))) for n, m in both_views(shrink).items()}
+    for centre in np.random.default_rng(3).uniform([-15.0, -20.0, -15.0], [15.0, -8.0, 15.0], (6, 3)):
+        areas = {name: true_area(view.method, centre, 5.0) for name, view in views.items()}
+        region = back_projected_region([(views[name], areas[name]) for name in views])
+        assert region is not None
+        near = np.stack(np.meshgrid(*3 * [np.arange(-9.0, 9.01, region.spacing[0])], indexing="ij"), axis=-1)
+        middle = region.origin + np.rint((centre - region.origin) / region.spacing) * region.spacing
+        cells = middle + near.reshape(-1, 3)
+        cells = cells[views["CC"].grid.holds(cells)]
+        seen = np.all([a.contains(views[n].method.project(cells)) for n, a in areas.items()], axis=0)
+        held = int(np.count_nonzero(region.data))
+        assert held == seen.sum()
 
 
 def test_a_tiny_lesion_on_a_sharp_grid_is_found() -> None:

@@ -114,3 +114,16 @@ def test_tissue_fraction_of_layers():
                             Volume(labels, np.zeros(3), np.ones(3)), 2, (1, 2, 0))  # fmt: skip
     assert whole[0] == pytest.approx(15.0 / 40.0, abs=0.05)
     assert tissue_fraction(mesh, Volume(labels * 0, np.zeros(3), np.ones(3)), 2, (1, 2)).max() == 0.0
+
+
+def test_tissue_fraction_of_an_element_that_narrows_is_of_its_volume():
+    wide, narrow, height = 30.0, 6.0, 40.0
+    corners = 0.5 * CORNERS[[0, 1, 3, 2, 4, 5, 7, 6]]
+    side = wide + (narrow - wide) * (corners[:, 2:] + 0.5)
+    frustum = BlockMesh(1, corners * np.hstack([side, side, np.full((8, 1), height)]))
+    labels = np.ones((64, 64, 80), dtype=np.uint8)
+    labels[:, :, :40] = 2  # gland fills the wide half, where four fifths of the volume lie
+    found = tissue_fraction(frustum, Volume(labels, np.array([-15.75, -15.75, -19.75]), np.full(3, 0.5)), 2, (1, 2))
+    middle = 0.5 * (wide + narrow)
+    below, above = (a**2 + a * middle + middle**2 for a in (wide, narrow))
+    assert found[0] == pytest.approx(below / (below + above), abs=0.005)
