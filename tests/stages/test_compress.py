@@ -193,7 +193,7 @@ def test_force_scales_with_the_stiffness(inputs, plain, tmp_path):
 
 def test_resumed_closing_is_what_compress_left(inputs, plain):
     artefacts = {name: Artefact(path) for name, path in inputs.items()}
-    closing, closed = resumed(artefacts["mesh"], plain, EDGE)
+    closing, closed = resumed(artefacts["mesh"], plain)
     lift = np.array([0.0, 0.0, plain.value("lift_mm")])
     np.testing.assert_allclose(closed.deformed + lift, _nodes(plain), atol=1e-12)
     idle = _idle()
@@ -243,7 +243,7 @@ def test_skin_sticks_where_friction_has_no_limit(inputs, plain, tmp_path):
     stuck = _with(inputs, tmp_path, friction=float("inf"))
     assert stuck.value("mechanics")["friction"] == "Infinity"
     assert stuck.value("force_n") > plain.value("force_n")
-    closing, closed = resumed(Artefact(inputs["mesh"]), stuck, EDGE)
+    closing, closed = resumed(Artefact(inputs["mesh"]), stuck)
     assert closing.contact.sticks
     assert closed.force_n[0] == stuck.value("force_lower_n")
 
@@ -277,7 +277,7 @@ def test_skin_holds_the_breast_together(inputs, plain, tmp_path, skin):
     assert tight.value("force_n") > 1.02 * bare.value("force_n")
     assert tight.value("part_energies_mj")["Membrane"] > 0.0
     assert ("membrane" in tight.names()) is (skin != "attached")
-    closing, closed = resumed(Artefact(inputs["mesh"]), tight, EDGE)
+    closing, closed = resumed(Artefact(inputs["mesh"]), tight)
     np.testing.assert_allclose(closed.deformed[:, 2] + tight.value("lift_mm"), _nodes(tight)[:, 2], atol=1e-9)
     again = closing.rest(closed, _idle(), 0.05)
     assert np.abs(again.deformed - closed.deformed).max() < 0.3

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.errors import DataError
+
 Array = NDArray[np.float64]
 
 FLAT = 1e9
@@ -65,11 +67,15 @@ class Plate:
         return Gap(distance, normal, np.where(rounded, 1.0 / safe, 0.0))
 
     def first_touch(self, points: Array) -> float:
-        """Height, mm, of the face at which the plate, coming from afar, first touches one of the points (N, 3)."""
+        """Height, mm, of the face at which the plate, coming from afar, first touches one of the points (N, 3).
+
+        Raises:
+            DataError: the plate ends in front of all of them.
+        """
         edge = FLAT if self.edge_p_mm is None else self.edge_p_mm
         across = np.maximum(points[:, 1] - (edge - self.lip_radius_mm), 0.0)
         front = across < self.lip_radius_mm
         if not front.any():
-            raise ValueError(f"no point lies in front of the plate's edge at posterior coordinate {edge:.1f} mm")
+            raise DataError(f"no point lies in front of the plate's edge at posterior coordinate {edge:.1f} mm")
         drop = self.lip_radius_mm - np.sqrt(self.lip_radius_mm**2 - across[front] ** 2)
         return float(self.facing * (self.facing * points[front, 2] + drop).min())

@@ -44,6 +44,13 @@ class SoftMemory:
     pressure: Array
     shift: Array = field(default_factory=NONE.copy)
 
+    def part(self, faces: NDArray[np.bool_]) -> "SoftMemory":
+        """What the contact points of the faces that a mask (F,) selects remember."""
+        kept = (
+            data[:, faces] if data.size else data for data in (self.anchor, self.traction, self.pressure, self.shift)
+        )
+        return SoftMemory(*kept)
+
 
 @dataclass(frozen=True)
 class SoftTerms:
@@ -87,6 +94,10 @@ class SoftContact:
     def stiffened(self, factor: float) -> "SoftContact":
         """The same contact, stiffer by a factor; its onset shrinks alike, which keeps the pressure at the plate."""
         return replace(self, stiffness=factor * self.stiffness, band_mm=self.band_mm / factor)
+
+    def part(self, faces: NDArray[np.bool_]) -> "SoftContact":
+        """The contact of the faces that a mask (F,) selects."""
+        return replace(self, surface=self.surface.part(faces))
 
     @property
     def sticks(self) -> bool:

@@ -1,5 +1,6 @@
 """Contact points on the quadrilateral faces of a body's skin."""
 
+from copy import copy
 from typing import Literal
 
 import numpy as np
@@ -41,6 +42,12 @@ class ContactSurface:
         tangents = np.einsum("dqa,fai->dfqi", slopes, np.asarray(points, dtype=float)[self.quads])
         size = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1)
         self.area: Array = size * np.outer(weight, weight).ravel()
+
+    def part(self, faces: NDArray[np.bool_]) -> "ContactSurface":
+        """The faces that a mask (F,) selects."""
+        other = copy(self)
+        other.quads, other.area = self.quads[faces], self.area[faces]
+        return other
 
     def positions(self, nodes: Array) -> Array:
         """Contact points (F, q, 3) of nodes (N, 3)."""

@@ -53,6 +53,11 @@ def scaled_jacobians(nodes: Floats, local: Floats) -> Floats:
     return np.asarray(np.linalg.det(matrices) / np.maximum(lengths, 1e-12))
 
 
+def folded_corners(nodes: Floats) -> NDArray[np.bool_]:
+    """Corners (M, 8) of hexahedra (M, 8, 3) at which the Jacobian is not positive."""
+    return np.asarray(scaled_jacobians(nodes, CORNERS) <= 0.0)
+
+
 def surface_distances(mesh: BlockMesh, vertices: Floats, triangles: Indices) -> Floats:
     """Distances in mm from each surface to the other, of points spread evenly over both, all in one array."""
     of_mesh = _sample_quads(mesh.points[np.concatenate([mesh.skin_quads(), mesh.back_quads()])])

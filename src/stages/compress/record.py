@@ -35,13 +35,16 @@ def placed_again(mesh: Artefact, compress: Artefact) -> PlacedBreast:
     return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland, compression)
 
 
-def kept_values(mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, angle_deg: float) -> dict[str, Value]:
+def kept_values(
+    mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, angle_deg: float, edge_p_mm: float
+) -> dict[str, Value]:
     """What later stages need to know of a compression."""
     return {
         "mechanics": mechanics.plain(),
         "options": asdict(options),
         "mu_kpa": mu_kpa,
         "angle_deg": angle_deg,
+        "edge_p_mm": edge_p_mm,
     }
 
 
@@ -51,27 +54,37 @@ def _kept_mechanics(compress: Artefact) -> BreastMechanics:
 
 def kept_arrays(closed: Closed, lift: Floats) -> dict[str, Array]:
     """The state of a breast between plates, from which `resumed` goes on; `lift` (3,) takes it to the pose's plates."""
-    memory = {f.name: getattr(closed.state.memory, f.name) for f in fields(SoftMemory)}
-    kept = {f"contact/{n}": Array(data, *_MEMORY[n]) for n, data in memory.items() if data.size}
+    kept = memory_arrays(closed.state.memory)
     kept["pressure"] = Array(closed.state.pressure, "kPa", "element pressures, positive in tension")
     if closed.extra is not None:
         kept[_MEMBRANE] = Array(closed.extra + lift, "mm", "nodes of the skin's own membrane, plate frame")
     return kept
 
 
-def _kept_memory(compress: Artefact) -> SoftMemory:
+def memory_arrays(memory: SoftMemory) -> dict[str, Array]:
+    """What contact points remember, as arrays of an artefact; empty ones are left out."""
+    kept = {f.name: getattr(memory, f.name) for f in fields(SoftMemory)}
+    return {f"contact/{n}": Array(data, *_MEMORY[n]) for n, data in kept.items() if data.size}
+
+
+def kept_memory(artefact: Artefact) -> SoftMemory:
     """What contact points remember; an array is empty where the contact does not need it."""
     names = {name: f"contact/{name}" for name in _MEMORY}
-    kept = {n: compress.array(key, _MEMORY[n][0]) for n, key in names.items() if key in compress.names()}
+    kept = {n: artefact.array(key, _MEMORY[n][0]) for n, key in names.items() if key in artefact.names()}
     return SoftMemory(**{f.name: kept.get(f.name, np.zeros(0)) for f in fields(SoftMemory)})
 
 
-def resumed(mesh: Artefact, compress: Artefact, edge_p_mm: float) -> tuple[Closing, Closed]:
-    """The plates and the breast between them as `compress` left them, in the floating breast's own height."""
+def closing_again(breast: PlacedBreast, compress: Artefact) -> Closing:
+    """The plates as `compress` had them around the breast that `placed_again` gives."""
     mechanics = _kept_mechanics(compress)
     options = replace(ClosingOptions(), **_options(compress.value("options")))
-    breast = placed_again(mesh, compress)
-    closing = closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))
+    edge_p_mm = float(compress.value("edge_p_mm"))
+    return closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))
+
+
+def resumed(mesh: Artefact, compress: Artefact) -> tuple[Closing, Closed]:
+    """The plates and the breast between them as `compress` left them, in the floating breast's own height."""
+    closing = closing_again(placed_again(mesh, compress), compress)
     state = _kept_state(compress, closing)
     membrane = None if closing.extra_nodes is None else state.positions[-len(closing.extra_nodes) :]
     closed = Closed(
@@ -102,7 +115,7 @@ def _kept_state(compress: Artefact, closing: Closing) -> DampedState:
         positions,
         compress.array("pressure", "kPa"),
         compress.value("raised_mm"),
-        _kept_memory(compress),
+        kept_memory(compress),
         tuple(part.renewed(positions) for part in closing.parts),
     )
 

@@ -16,6 +16,7 @@ from mammoreg.meshing.block import BlockMesh
 from stages.compress.gland_map import gland_share, gland_share_array
 from stages.compress.record import kept_arrays, kept_values
 from stages.compress.solve_report import report_values, seconds_text
+from stages.deformed import force_values, mesh_values
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.mechanics import Mechanics
@@ -61,15 +62,17 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     print(seconds_text(closed.report), flush=True)
     # The floating breast is placed where the pose has seen the plates.
     lift = np.array([0.0, 0.0, view.height_mm - closed.height_mm])
+    deformed = closed.deformed + lift
     return Fields(
         arrays={
-            "deformed": Array(closed.deformed + lift, "mm", "mesh nodes between the plates, plate frame"),
+            "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame"),
             "residuals": Array(np.array(closed.residuals), "1", "unbalanced over internal forces, each iteration"),
             **kept_arrays(closed, lift),
             **gland_share_array(gland),
         },
         values={
             **closing_report(closed),
+            **mesh_values(inputs.artefact("mesh"), deformed, view.angle_deg),
             "height_mm": view.height_mm,
             "lift_mm": float(lift[2]),
             "known_lower_mm": lower_mm,
@@ -77,7 +80,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             "uncompressed_mm": closing.uncompressed_mm,
             "compression": compression,
             "stiffness_ratio": breast.stiffness_ratio,
-            **kept_values(settings.mechanics, options, mu_kpa, view.angle_deg),
+            **kept_values(settings.mechanics, options, mu_kpa, view.angle_deg, view.edge_p_mm),
         },
     )
 
@@ -106,12 +109,9 @@ def _force_n(pose: Artefact) -> float:
 
 def closing_report(closed: Closed) -> dict[str, Value]:
     """What happened in a compression."""
-    lower, upper = closed.force_n
     return {
         "thickness_mm": closed.gap_mm,
-        "force_n": 0.5 * (lower + upper),
-        "force_lower_n": lower,
-        "force_upper_n": upper,
+        **force_values(closed.force_n),
         "cut_steps": closed.cuts,
         "last_motion_mm": closed.restless_mm,
         "penetration_mm": closed.penetration_mm,
@@ -121,7 +121,7 @@ def closing_report(closed: Closed) -> dict[str, Value]:
 
 STAGE = Stage(
     name="compress",
-    schema=2,
+    schema=3,
     inputs=("mesh", "pose", "calibrate"),
     optional=("segment",),
     settings=Settings,

@@ -11,12 +11,26 @@ from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.alignment import Alignment
 from mammoreg.shape.estimate import estimate_shape
-from stages.compress.record import resumed
+from stages.compress.record import memory_arrays, resumed
+from stages.deformed import force_values, mesh_values
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.methods import block_mesh, pose_outline, view_geometry
 
 Nodes = NDArray[np.int64]
 TOUCHING_MM = 1.0
+_FACTS = (
+    "penetration_mm",
+    "volume_change",
+    "min_det_f",
+    "force_n",
+    "force_lower_n",
+    "force_upper_n",
+    "contact_lost",
+    "folded_corners",
+    "folded_elements",
+    "folded_corner_points",
+    "sideways_drift_mm",
+)
 
 
 class Settings(SettingsModel):
@@ -35,10 +49,11 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     mesh_file, pose, compress = (inputs.artefact(name) for name in ("mesh", "pose", "compress"))
     mesh = block_mesh(mesh_file)
     view, lift_mm = view_geometry(pose), float(compress.value("lift_mm"))
-    closing, closed = resumed(mesh_file, compress, view.edge_p_mm)
+    closing, closed = resumed(mesh_file, compress)
     nodes = np.union1d(mesh.skin_nodes(), _on_plates(mesh.back_nodes(), closing, closed))
     if not pose.has("outline"):
-        return _fields(nodes, compress.array("deformed", "mm"), compress.array("pressure", "kPa"), {"rounds": 0})
+        deformed, facts = compress.array("deformed", "mm"), {name: compress.value(name) for name in _FACTS}
+        return _fields(nodes, deformed, closed, {"rounds": 0, **facts})
     outline = pose_outline(pose)
     facets = skin_facets(mesh.skin_quads(), len(mesh.points), settings.facets)
     floating = replace(view, height_mm=view.height_mm - lift_mm)
@@ -58,9 +73,11 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         "contact_drift_mm": _drift(_on_plates(mesh.skin_nodes(), closing, closed), closed, found.closed),
         "penetration_mm": found.closed.penetration_mm,
         "volume_change": found.closed.volume_change,
+        "min_det_f": found.closed.min_det_f,
     }
     lifted = found.closed.deformed + np.array([0.0, 0.0, lift_mm])
-    return _fields(nodes, lifted, found.closed.state.pressure, values | {"min_det_f": found.closed.min_det_f})
+    values |= force_values(found.closed.force_n) | mesh_values(mesh_file, lifted, view.angle_deg)
+    return _fields(nodes, lifted, found.closed, values)
 
 
 def _misfit(when: str, state: Alignment) -> dict[str, Value]:
@@ -87,16 +104,17 @@ def _drift(nodes: Nodes, before: Closed, after: Closed) -> float:
     return float(np.abs(heights[1] - heights[0]).max(initial=0.0))
 
 
-def _fields(nodes: Nodes, deformed: Points, pressure: Points, values: dict[str, Value]) -> Fields:
+def _fields(nodes: Nodes, deformed: Points, closed: Closed, values: dict[str, Value]) -> Fields:
     return Fields(
         arrays={
             "surface_nodes": Array(nodes, "1", "numbers of the mesh nodes on the skin, and of the back on the plates"),
             "surface": Array(deformed[nodes], "mm", "estimated places of these nodes, plate frame"),
             "deformed": Array(deformed, "mm", "all mesh nodes as the surface was estimated, plate frame"),
-            "pressure": Array(pressure, "kPa", "element pressures there, positive in tension"),
+            "pressure": Array(closed.state.pressure, "kPa", "element pressures there, positive in tension"),
+            **memory_arrays(closed.state.memory),
         },
         values=values,
     )
 
 
-STAGE = Stage(name="shape", schema=2, inputs=("mesh", "pose", "compress"), settings=Settings, run=run)
+STAGE = Stage(name="shape", schema=3, inputs=("mesh", "pose", "compress"), settings=Settings, run=run)

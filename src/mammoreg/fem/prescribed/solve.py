@@ -43,6 +43,7 @@ class PrescribedResult:
         min_det_f: smallest det F at a Gauss point.
         volume_change: relative change of the whole volume.
         reaction_n: force (3,) that holds the prescribed nodes.
+        node_reaction_n: force (N, 3) that holds each node; where it is free, what is left of balance.
         extra: extra nodes (M, 3), mm, or None.
         report: of the solve.
     """
@@ -57,6 +58,7 @@ class PrescribedResult:
     min_det_f: float
     volume_change: float
     reaction_n: Array
+    node_reaction_n: Array
     extra: Array | None = None
     report: SolveReport | None = None
 
@@ -130,6 +132,7 @@ def _result(
         cuts=cuts,
         unbalance=equilibrium.unbalance(state),
     )
+    reaction = 1e-3 * equilibrium.reaction(state)
     return PrescribedResult(
         deformed=state.positions[:count],
         pressure=state.pressure,
@@ -140,7 +143,8 @@ def _result(
         energy_mj=report.isochoric_mj,
         min_det_f=report.min_det_f,
         volume_change=report.volume_change,
-        reaction_n=1e-3 * equilibrium.reaction(state)[nodes].sum(axis=0),
+        reaction_n=reaction[nodes].sum(axis=0),
+        node_reaction_n=reaction[:count],
         extra=None if len(state.positions) == count else state.positions[count:],
         report=report,
     )

@@ -83,7 +83,7 @@ def draw_to_points(
     """
     start, goal = points
     lift = np.array([0.0, 0.0, float(compress.value("lift_mm"))])
-    closing, closed = resumed(mesh, compress, case.way(compress.array("deformed", "mm")).geometry.edge_p_mm)
+    closing, closed = resumed(mesh, compress)
     quads = case.block.skin_quads()
     corners, shares = nearest_on_skin(case.block.points, quads, start)
     away = np.linalg.norm(np.einsum("pa,pai->pi", shares, case.block.points[corners]) - start, axis=1)
