@@ -18,8 +18,8 @@ LOST_SHARE = 0.05
 def mesh_values(mesh: Artefact, deformed: Points, angle_deg: float) -> dict[str, Value]:
     """Folded corners and sideways drift of nodes (N, 3), plate frame, mm.
 
-    `folded_corners` counts the corners of elements whose Jacobian is not positive, `folded_corner_points` are their
-    places in the undeformed breast (LPS, mm).
+    `folded_corners` counts the corners of elements whose Jacobian is not positive, `folded_share` is the share of
+    elements with one, `folded_corner_points` are their places in the undeformed breast (LPS, mm).
     """
     block = block_mesh(mesh)
     hexes = block.hexes()
@@ -29,7 +29,7 @@ def mesh_values(mesh: Artefact, deformed: Points, angle_deg: float) -> dict[str,
     places = mesh.array("points", "mm")[hexes[folded]]
     return {
         "folded_corners": int(folded.sum()),
-        "folded_elements": int(folded.any(axis=1).sum()),
+        "folded_share": float(folded.any(axis=1).mean()),
         "folded_corner_points": [[round(float(x), 2) for x in place] for place in places],
         "sideways_drift_mm": drift,
     }

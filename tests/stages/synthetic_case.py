@@ -123,9 +123,11 @@ def _outline(view: str) -> np.ndarray:
     return np.roll(polygon, -1 - int(np.argmin(gaps)), axis=0)
 
 
-def write_solution(path: Path, laterality: Laterality, stage: str, view: str) -> Path:
+def write_solution(
+    path: Path, laterality: Laterality, stage: str, view: str, changes: dict[str, Any] | None = None
+) -> Path:
     arrays = {"deformed": Array(compression(view).forward(box().points), "mm", "nodes between the plates")}
-    values = {"force_lower_n": 79.0, "force_upper_n": 81.0, "min_det_f": 0.9}
+    values = {"force_lower_n": 79.0, "force_upper_n": 81.0, "min_det_f": 0.9, **(changes or {})}
     write_artefact(path, header(stage, laterality, view), Fields(arrays=arrays, values=values))
     return path
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mammoreg.contact.plate import Plate
 from mammoreg.geometry import breast_to_lps
 from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Array, Fields, write_artefact
@@ -37,6 +38,12 @@ def chain(tmp_path_factory):
     return found
 
 
+def _deepest(artefact, height_mm):
+    """Depth of the deepest node of skin or back in the plates, their rounded lips included, mm."""
+    points = artefact.array("deformed", "mm")[np.union1d(_bent().skin_nodes(), _bent().back_nodes())]
+    return max(-Plate(h, up, EDGE, 8.0).gap(points).distance.min() for h, up in ((height_mm, 1), (height_mm + GAP, -1)))
+
+
 def _inside_the_plates(artefact, height_mm):
     """Depth (B,) of back nodes in the plates, mm, those in front of the plates' lips."""
     back = artefact.array("deformed", "mm")[_bent().back_nodes()]
@@ -50,6 +57,14 @@ def test_back_between_the_plates_stays_out_of_them(chain):
     for stage in ("compress", "shape", "solve"):
         assert chain[stage].ok, chain[stage].message
         assert _inside_the_plates(chain[stage], height_mm).max() < 1.5
+
+
+def test_solve_keeps_the_plates_under_their_lips_too(chain):
+    height_mm = chain["compress"].value("height_mm")
+    shape, solve = (_deepest(chain[stage], height_mm) for stage in ("shape", "solve"))
+    assert solve <= shape + 0.1
+    assert chain["solve"].value("penetration_mm") <= chain["shape"].value("penetration_mm") + 0.1
+    assert chain["solve"].value("penetration_mm") > solve - 0.01, "corners are contact points"
 
 
 def test_surface_holds_the_back_that_the_plates_press(chain):

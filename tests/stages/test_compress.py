@@ -219,6 +219,14 @@ def test_case_with_a_compression_alone_is_pressed(tmp_path):
     assert got.value("thickness_mm") < 0.8 * np.ptp(MESH.points[:, 2])
 
 
+def test_facts_of_the_deformed_mesh_stand_beside_the_forces(plain):
+    forces = [plain.value(f"force_{plate}_n") for plate in ("lower", "upper")]
+    assert plain.value("force_n") == pytest.approx(np.mean(forces))
+    assert not plain.value("contact_lost")
+    assert abs(plain.value("sideways_drift_mm")) < 2.0
+    assert len(plain.value("folded_corner_points")) == plain.value("folded_corners")
+
+
 def test_report_of_the_solve_is_kept_without_its_times(inputs, plain, tmp_path):
     assert plain.value("unbalance") < 0.02
     assert plain.value("energy_mj") > 10.0 * plain.value("volumetric_energy_mj") > 0.0

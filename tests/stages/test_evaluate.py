@@ -119,6 +119,29 @@ def test_doubts_of_the_pose_stand_before_every_method_s_own(tmp_path: Path) -> N
         assert told == [*doubts[row["view"]], *own]
 
 
+@pytest.mark.parametrize(
+    ("values", "doubt"),
+    [
+        ({"penetration_mm": 3.9}, ""),
+        ({"penetration_mm": 4.1}, "skin or back 4.1 mm inside a plate"),
+        ({"folded_corners": 9, "folded_share": 0.02}, ""),
+        ({"folded_corners": 40, "folded_share": 0.06}, "40 folded corners in 6% of the elements"),
+        ({"contact_lost": True, "force_lower_n": 160.0, "force_upper_n": 0.0}, "contact with the upper plate lost"),
+        ({"sideways_drift_mm": -4.7}, ""),
+        ({"sideways_drift_mm": -4.9}, "breast tipped sideways by 4.9 mm"),
+    ],
+)
+def test_what_speaks_against_a_breast_between_plates(tmp_path: Path, values: dict[str, Any], doubt: str) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    for stage in ("compress", "solve"):
+        synthetic.write_solution(inputs[stage][0], "R", stage, "CC", {"thickness_mm": 80.0, **values})
+    found = evaluated(tmp_path, inputs)
+    for method in ("plate", "updated"):
+        trust = rows_of(found, "view_rows", method)[0]["trust"]
+        assert trust.startswith(doubt) if doubt else trust == ""
+    assert rows_of(found, "view_rows", "rigid")[0]["trust"].find("plate") < 0
+
+
 def test_elongation_is_the_closed_form(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path, views=("3D",), compressed=True)
     stretch = synthetic.SHRINK**-0.5 - 1.0

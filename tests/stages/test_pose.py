@@ -71,6 +71,14 @@ def test_thickness_larger_than_the_breast_fails_and_says_what_to_do(inputs, tmp_
     assert "correct thickness_mm" in got.message
 
 
+@pytest.mark.parametrize("thickness_mm", ["5.8", "20", "26"])
+def test_thickness_too_small_for_the_breast_fails_and_says_what_to_do(inputs, tmp_path, thickness_mm):
+    got = run("pose", tmp_path, inputs, row=ROW | {"thickness_mm": thickness_mm})
+    assert got.status == "failed"
+    assert f"{float(thickness_mm):.1f} mm is too small for a breast of 9" in got.message
+    assert "correct thickness_mm in the views table (or the header; it is in mm)" in got.message
+
+
 def test_unknown_pixel_spacing_fails_and_says_what_to_do(inputs, tmp_path):
     row = {name: text for name, text in ROW.items() if name != "pixel_spacing_mm"}
     got = run("pose", tmp_path, inputs, row=row)

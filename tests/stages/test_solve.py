@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stages.compress.record import kept_memory, memory_arrays
 from stages.engine.artefact import Array, Artefact, Fields, write_artefact
 from tests.stages.pressed_case import MESH, run, write_pose, write_start
 from tests.stages.synthetic_case import header
@@ -23,10 +24,9 @@ def chain(tmp_path_factory):
 
 def _moved(path, shape, motion):
     """The shape's surface moved, and nothing else of it."""
-    arrays = {
-        name: Array(shape.array(name, units), units, name)
-        for name, units in (("surface_nodes", "1"), ("surface", "mm"), ("deformed", "mm"), ("pressure", "kPa"))
-    }
+    names = (("surface_nodes", "1"), ("surface", "mm"), ("deformed", "mm"), ("pressure", "kPa"))
+    arrays = {name: Array(shape.array(name, units), units, name) for name, units in names}
+    arrays |= memory_arrays(kept_memory(shape))
     arrays["surface"] = Array(shape.array("surface", "mm") + motion, "mm", "surface")
     write_artefact(path, header("shape", "R", "CC"), Fields(arrays=arrays))
     return path
@@ -43,12 +43,16 @@ def test_interior_is_that_of_the_shape(chain, tmp_path):
     assert got.value("residuals")[-1] < 1e-4
 
 
-def test_plates_and_force_are_those_of_the_compression(chain, tmp_path):
-    compress, got = Artefact(chain["compress"]), run("solve", tmp_path, chain)
-    assert (got.value("thickness_mm"), got.value("force_n")) == (
-        compress.value("thickness_mm"),
-        compress.value("force_n"),
-    )
+def test_plates_press_as_where_the_surface_was_estimated(chain, tmp_path):
+    """The force that holds the surface, with the contact beside it, is the contact force of `shape`."""
+    compress, shape, got = Artefact(chain["compress"]), Artefact(chain["shape"]), run("solve", tmp_path, chain)
+    assert got.value("thickness_mm") == compress.value("thickness_mm")
+    forces = [shape.value(f"force_{plate}_n") for plate in ("lower", "upper")]
+    assert got.value("force_lower_n") == pytest.approx(forces[0], rel=0.02)
+    assert got.value("force_upper_n") == pytest.approx(forces[1], rel=0.02)
+    assert got.value("force_n") == pytest.approx(np.mean([got.value("force_lower_n"), got.value("force_upper_n")]))
+    assert forces[0] > 1.0
+    assert not got.value("contact_lost")
 
 
 def test_interior_follows_another_surface(chain, tmp_path):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, plate_pair, touching
 from mammoreg.contact.surface import ContactSurface, Rule
+from mammoreg.errors import DataError
 from tests.unit.fe_bodies import block
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,7 @@ def test_first_touch_touches_and_does_not_pass(facing: int) -> None:
 
 
 def test_plate_in_front_of_the_whole_body_is_refused() -> None:
-    with pytest.raises(ValueError, match="no point lies in front"):
+    with pytest.raises(DataError, match="no point lies in front"):
         Plate(0.0, 1, -50.0, 5.0).first_touch(np.zeros((3, 3)))
 
 

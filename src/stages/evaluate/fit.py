@@ -10,6 +10,7 @@ from mammoreg.metrics.outline_fit import outline_fit
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
 from stages.engine.artefact import Artefact
+from stages.evaluate.mechanical_doubts import MechanicalLimits, mechanical_doubts
 from stages.evaluate.predictions import Row
 from stages.methods import FINE_RAYS, MESH_METHODS, of_view, pose_outline
 
@@ -27,12 +28,14 @@ class Limits:
         outline_p95_mm: 95th percentile of the outline's misfit.
         beam_gap_mm: gap of the beams to a lesion marked in two views.
         min_det_f: smallest volume ratio in the deformed mesh.
+        mechanical: of breasts between plates.
         compression: share of the thickness that the cases table says the plates take away, None where it does not.
     """
 
     outline_p95_mm: float
     beam_gap_mm: float
     min_det_f: float
+    mechanical: MechanicalLimits
     compression: float | None = None
 
 
@@ -66,7 +69,10 @@ def fit_rows(
         row["outline_step"] = None
         row |= {name: _number(solution, name) for name in ("penetration_mm", "folded_corners")}
         row["estimated"] = "; ".join(pose.value("estimated"))
-        row["trust"] = "; ".join([*remarks, *_doubts(row, solution, beam_gaps.get(method), limits)])
+        compress = of_view([a for a in results if a.stage == "compress"], view)
+        doubts = _doubts(row, solution, beam_gaps.get(method), limits)
+        doubts += mechanical_doubts(solution, compress, limits.mechanical)
+        row["trust"] = "; ".join([*remarks, *doubts])
         rows.append(row)
     return rows
 

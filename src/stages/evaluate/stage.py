@@ -7,6 +7,7 @@ from stages.engine.artefact import Fields
 from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
 from stages.evaluate.elongation import elongation_rows
 from stages.evaluate.fit import Limits, fit_rows
+from stages.evaluate.mechanical_doubts import MechanicalLimits
 from stages.evaluate.places import (
     landmark_rows_in_compressed,
     landmark_rows_in_mammogram,
@@ -27,6 +28,27 @@ class Settings(SettingsModel):
     outline_p95_limit_mm: float = Field(5.0, gt=0, description="95th percentile of the outline's misfit, mm")
     beam_gap_limit_mm: float = Field(10.0, gt=0, description="gap of the beams to a lesion seen in two views, mm")
     min_det_f_limit: float = Field(0.2, ge=0, le=1, description="smallest volume ratio in the deformed mesh")
+    penetration_limit: float = Field(
+        0.05,
+        gt=0,
+        le=1,
+        description="skin or back inside a plate, as a share of the thickness; from where the solver "
+        "hardens its contact",
+    )
+    folded_limit: float = Field(
+        0.05,
+        gt=0,
+        le=1,
+        description="elements with a folded corner, as a share of all; a few at the breast's rim "
+        "are usual (chosen: sound compressions have up to 0.026)",
+    )
+    drift_limit: float = Field(
+        0.06,
+        gt=0,
+        le=1,
+        description="mean sideways motion of the breast over its back, as a share of the thickness: "
+        "beyond it tips over (chosen: sound compressions have up to 0.05)",
+    )
 
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
@@ -89,10 +111,12 @@ def _landmarks(inputs: Inputs, predictions: Predictions) -> list[Row]:
 def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> dict[str, list[Row]]:
     """Fit and elongation of each view whose pose is known."""
     results = [a for name in ("compress", "solve", "project") for a in inputs.artefacts(name)]
+    mechanical = MechanicalLimits(settings.penetration_limit, settings.folded_limit, settings.drift_limit)
     limits = Limits(
         settings.outline_p95_limit_mm,
         settings.beam_gap_limit_mm,
         settings.min_det_f_limit,
+        mechanical,
         subject.number("compression"),
     )
     gaps = Predictions(inputs.artefact("localize")).beam_gaps()

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.breast.placed import closing_plates, place_breast
-from mammoreg.errors import NotConvergedError
+from mammoreg.errors import DataError, NotConvergedError
 from mammoreg.fem.plates.closing import COARSE, ClosingOptions
 from mammoreg.geometry import ViewGeometry
 from mammoreg.meshing.block import BlockMesh
@@ -34,7 +34,7 @@ def coarse_compression(
         for options in (COARSE, CAREFUL):
             try:
                 closed = closing_plates(breast, view.edge_p_mm, alike, options, lower_mm).close(view.thickness_mm)
-            except NotConvergedError:
+            except (DataError, NotConvergedError):  # also plates that end in front of the breast
                 continue
             return Compressed(closed.deformed, closed.height_mm)
         return None

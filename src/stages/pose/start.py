@@ -7,7 +7,7 @@ import numpy as np
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, breast_to_plate
-from mammoreg.geometry.frames import plate_rotation
+from mammoreg.geometry.frames import Points, plate_rotation
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.estimate import Compressed
@@ -53,8 +53,28 @@ def start_view(
             f"the compressed thickness of {view.thickness_mm:.1f} mm is not below the uncompressed breast's "
             f"{height:.1f} mm; correct thickness_mm in the views table (or the header), or check the MR volume's side"
         )
-    scaled = fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, seen.outline)
-    return scaled.alignment.view, estimated, doubts
+    fitted = fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, seen.outline).alignment.view
+    _refuse_runaway(turned, fitted, height)
+    return fitted, estimated, doubts
+
+
+def _refuse_runaway(turned: Points, fitted: ViewGeometry, height: float) -> None:
+    """Refuse an edge that leaves less between the plates than these are apart, and not half of the breast's height.
+
+    A breast scaled to too small a thickness is far larger than the one in the image; only its tip fits the outline
+    then, and the edge moves through it.
+
+    Raises:
+        DataError: with the remedy.
+    """
+    front = turned[turned[:, 1] < fitted.edge_p_mm, 2]
+    left = float(np.ptp(front)) if len(front) else 0.0
+    if left < min(fitted.thickness_mm, 0.5 * height):
+        raise DataError(
+            f"the compressed thickness of {fitted.thickness_mm:.1f} mm is too small for a breast of {height:.1f} mm: "
+            "so flat and volume-preserving it would be far larger than the mammogram shows it; correct thickness_mm "
+            "in the views table (or the header; it is in mm), or check that MR volume and mammogram belong together"
+        )
 
 
 def without_image(mesh: BlockMesh, subject: Subject) -> Fields:

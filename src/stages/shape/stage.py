@@ -27,7 +27,7 @@ _FACTS = (
     "force_upper_n",
     "contact_lost",
     "folded_corners",
-    "folded_elements",
+    "folded_share",
     "folded_corner_points",
     "sideways_drift_mm",
 )

@@ -105,6 +105,10 @@ class Relaxation:
         Raises:
             NotConvergedError: it is not.
         """
+        if max(closed.force_n) == 0.0:
+            raise NotConvergedError(
+                f"the breast has left the plates: neither presses it at a gap of {self.gap_mm:.1f} mm"
+            )
         passed = self.stiff.penetration_mm(closed.state, self.load.plates)
         if passed > LARGEST_PENETRATION * self.gap_mm:
             raise NotConvergedError(f"the skin passes the plates by {passed:.1f} mm at a gap of {self.gap_mm:.1f} mm")
