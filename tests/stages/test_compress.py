@@ -148,7 +148,7 @@ def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain,
     assert len(share) == len(MESH.hexes())
     assert share.min() == 0.0
     assert share.max() > 0.3
-    without = _with(inputs, tmp_path, material="fat_and_gland")
+    without = run("compress", tmp_path, inputs, {"mechanics": {"material": "fat_and_gland"}})
     assert without.status == "failed"
     assert "needs the input segment; give it with --in segment=path" in without.message
 
