@@ -1,6 +1,6 @@
 """A breast that the plates have really pressed: artefacts up to `mesh`, a mammogram as PNG, and the truth of both."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from PIL import Image
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.breast.placed import closing_plates, place_breast
 from mammoreg.fem.plates.closing import ClosingOptions
-from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, breast_to_plate
+from mammoreg.geometry import ViewGeometry, Volume, breast_to_plate
 from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.deformation import MeshDeformation, ReferenceMesh
 from mammoreg.materials.attenuation import attenuation_map
@@ -18,9 +18,12 @@ from mammoreg.meshing.locate import Locator
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.silhouette import detector_mm, quad_edges, ray_angles, silhouette
 from mammoreg.projection.cone_beam import project_volume
-from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
+from stages.mesh.record import mesh_fields
+from stages.pose.record import ImageOutline, PoseFields
+from stages.segment.record import segment_fields
 from tests.stages.synthetic_case import header
 from tests.unit.block_meshes import half_ellipsoid
 
@@ -95,14 +98,10 @@ def write_start(
     volumes = {"labels": tissue, "breast_mask": tissue.with_data((tissue.data > 0).astype(np.uint8))}
     if compressed:
         volumes["compressed_mask"] = second_mask()
-    nipple = breast_to_lps(np.array([0.0, -78.0, 0.0]), laterality)
-    segment = Fields(
-        arrays={"nipple": Array(nipple, "mm", "nipple")},
-        volumes={n: VolumeField(v.to_lps(laterality), "1", n) for n, v in volumes.items()},
-    )
+    back, nipple = MESH.points[MESH.back_nodes()], np.array([0.0, -78.0, 0.0])
+    segment = segment_fields(volumes, back, nipple, laterality, {})
     write_artefact(found["segment"], header("segment", laterality), segment)
-    arrays = {"points": Array(breast_to_lps(MESH.points, laterality), "mm", "nodes")}
-    write_artefact(found["mesh"], header("mesh", laterality), Fields(arrays=arrays, values={"n": MESH.n}))
+    write_artefact(found["mesh"], header("mesh", laterality), mesh_fields(MESH, laterality, {}))
     write_artefact(found["calibrate"], header("calibrate", "R"), Fields(values={"mu_kpa": mu_kpa}))
     return found
 
@@ -118,16 +117,21 @@ def second_mask() -> Volume:
     return Volume(body.reshape(shape).astype(np.uint8), low, np.full(3, spacing))
 
 
-def write_pose(path: Path, wider_mm: float = 0.0, view: str = "CC", outlined: bool = True, **changes) -> Path:
+def write_pose(
+    path: Path, wider_mm: float = 0.0, view: str = "CC", outlined: bool = True, plates_known: bool = False, **changes
+) -> Path:
     """The true pose, `changes` aside, with the true outline moved outwards at the middle of the plates."""
     truth = pressed()
-    values = {f.name: getattr(truth.view, f.name) for f in fields(ViewGeometry) if f.name != "parallel"}
-    values |= {"plates_known": False, **changes}
-    arrays = {}
-    if outlined:
-        pixels, weight = _outline(truth, wider_mm)
-        arrays = {"outline": Array(pixels, "px", "outline"), "outline_weight": Array(weight, "1", "trust")}
-    write_artefact(path, header("pose", "R", view), Fields(arrays=arrays, values=values))
+    placed = {name: value for name, value in changes.items() if name in {f.name for f in fields(ViewGeometry)}}
+    pose = PoseFields(
+        view=replace(truth.view, **placed),
+        rigid=truth.view,
+        maps={},
+        outline=ImageOutline(*_outline(truth, wider_mm)) if outlined else None,
+        plates_known=plates_known,
+        values={name: value for name, value in changes.items() if name not in placed},
+    )
+    write_artefact(path, header("pose", "R", view), pose.fields())
     return path
 
 

@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps
+from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.geometry.frames import Laterality, plate_rotation
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.meshing.block import BlockMesh
-from stages.engine.artefact import Array, Fields, VolumeField, write_artefact
+from stages.engine.artefact import Array, Fields, write_artefact
 from stages.engine.failures import Failure
+from stages.mesh.record import mesh_fields
+from stages.pose.record import ImageOutline, ImageStorage, PoseFields
+from stages.segment.record import segment_fields
 
 SHRINK = 0.7
 ROWS, COLUMNS, PIXEL_MM = 700, 400, 0.25
@@ -53,37 +56,31 @@ def write_segment(path: Path, laterality: Laterality, compressed: bool = False) 
         np.meshgrid(*(o + s * np.arange(k) for o, s, k in zip(origin, spacing, n, strict=True)), indexing="ij"), axis=-1
     )
     inside = (np.abs(grid[..., [0, 2]]) < HALF_WIDTH).all(-1) & (grid[..., 1] < 0) & (grid[..., 1] > -DEPTH)
-    mask = Volume(inside.astype(np.uint8), origin, spacing).to_lps(laterality)
+    volumes = {"breast_mask": Volume(inside.astype(np.uint8), origin, spacing)}
     side = np.linspace(-HALF_WIDTH, HALF_WIDTH, 31)
     wall = np.stack([*np.meshgrid(side, side, indexing="ij"), np.zeros((31, 31))], axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
-    volumes = {"breast_mask": VolumeField(mask, "1", "breast")}
     if compressed:
-        volumes["compressed_mask"] = VolumeField(_compressed_mask(laterality), "1", "body between the plates")
-    arrays = {
-        "nipple": Array(breast_to_lps(np.array([0.0, -DEPTH, 0.0]), laterality), "mm", "nipple"),
-        "chest_wall_surface": Array(breast_to_lps(wall, laterality), "mm", "chest wall"),
-    }
-    write_artefact(path, header("segment", laterality), Fields(arrays=arrays, volumes=volumes))
+        volumes["compressed_mask"] = _compressed_mask()
+    fields = segment_fields(volumes, wall, np.array([0.0, -DEPTH, 0.0]), laterality, {})
+    write_artefact(path, header("segment", laterality), fields)
     return path
 
 
 SECOND_VOLUME_SHIFT = np.array([4.0, -3.0, 6.0])
 
 
-def _compressed_mask(laterality: Laterality) -> Volume:
+def _compressed_mask() -> Volume:
     """The body between the plates of the CC, shifted by `SECOND_VOLUME_SHIFT`, with a chest behind."""
     axis = np.arange(-90.0, 91.0, 2.0)
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3) - SECOND_VOLUME_SHIFT
     back = compression("CC").inverse(grid @ plate_rotation(geometry("CC").angle_deg).T)
     body = (np.abs(back[:, [0, 2]]) < HALF_WIDTH).all(-1) & (back[:, 1] > -DEPTH) | (back[:, 1] > 0)
     data = body.reshape(len(axis), len(axis), len(axis)).astype(np.uint8)
-    return Volume(data, np.full(3, -90.0), np.full(3, 2.0)).to_lps(laterality)
+    return Volume(data, np.full(3, -90.0), np.full(3, 2.0))
 
 
 def write_mesh(path: Path, laterality: Laterality) -> Path:
-    block = box()
-    arrays = {"points": Array(breast_to_lps(block.points, laterality), "mm", "nodes")}
-    write_artefact(path, header("mesh", laterality), Fields(arrays=arrays, values={"n": block.n}))
+    write_artefact(path, header("mesh", laterality), mesh_fields(box(), laterality, {}))
     return path
 
 
@@ -95,23 +92,17 @@ def write_pose(
     outlined: bool,
     flags: Sequence[str] = (),
 ) -> Path:
-    g = geometry(view)
-    placed = {name: getattr(g, name) for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "thickness_mm")}
-    values: dict[str, Any] = {**placed, **{f"rigid_{name}": value for name, value in placed.items()}}
-    values |= {"source_detector_mm": 650.0, "support_detector_mm": 15.0, "pixel_mm": PIXEL_MM, "flags": list(flags)}
-    values |= {"estimated": ["source_detector_mm"]}
-    values |= {"drawn_mm": [0.0, 0.0, 0.0]}
-    values |= {"rows": ROWS, "columns": COLUMNS, "stored_rows": ROWS, "stored_columns": COLUMNS}
-    values |= {"flip_rows": flips[0], "flip_columns": flips[1]}
-    outline = _outline(view)
-    arrays = {}
-    if outlined:
-        arrays["outline"] = Array(outline, "px", "outline")
-        arrays["outline_weight"] = Array(np.ones(len(outline)), "1", "trust in the outline")
-    for name, affine in {"rigid": turning(view), "scaling": compression(view)}.items():
-        arrays[f"{name}_matrix"] = Array(affine.matrix, "1", name)
-        arrays[f"{name}_offset"] = Array(affine.offset, "mm", name)
-    write_artefact(path, header("pose", laterality, view), Fields(arrays=arrays, values=values))
+    found = PoseFields(
+        view=geometry(view),
+        rigid=geometry(view),
+        maps={"rigid": turning(view), "scaling": compression(view)},
+        outline=ImageOutline(_outline(view), np.ones(len(_outline(view)))) if outlined else None,
+        storage=ImageStorage(ROWS, COLUMNS, *flips),
+        drawn_mm=(0.0, 0.0, 0.0),
+        estimated=("source_detector_mm",),
+        flags=flags,
+    )
+    write_artefact(path, header("pose", laterality, view), found.fields())
     return path
 
 
@@ -127,7 +118,7 @@ def write_solution(
     path: Path, laterality: Laterality, stage: str, view: str, changes: dict[str, Any] | None = None
 ) -> Path:
     arrays = {"deformed": Array(compression(view).forward(box().points), "mm", "nodes between the plates")}
-    values = {"force_lower_n": 79.0, "force_upper_n": 81.0, "min_det_f": 0.9, **(changes or {})}
+    values = {"force_lower_n": 79.0, "force_upper_n": 81.0, "min_det_f": 0.9, "thickness_mm": 80.0, **(changes or {})}
     write_artefact(path, header(stage, laterality, view), Fields(arrays=arrays, values=values))
     return path
 

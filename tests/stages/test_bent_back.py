@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mammoreg.contact.plate import Plate
-from mammoreg.geometry import breast_to_lps
 from mammoreg.meshing.block import BlockMesh
-from stages.engine.artefact import Array, Fields, write_artefact
+from stages.engine.artefact import write_artefact
+from stages.mesh.record import mesh_fields
 from tests.stages.pressed_case import EDGE, GAP, run, write_pose, write_start
 from tests.stages.synthetic_case import header
 from tests.unit.block_meshes import half_ellipsoid
@@ -27,8 +27,7 @@ def _bent():
 def chain(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bent")
     found = {"calibrate": write_start(folder)["calibrate"], "mesh": folder / "bent.h5"}
-    arrays = {"points": Array(breast_to_lps(_bent().points, "R"), "mm", "nodes")}
-    write_artefact(found["mesh"], header("mesh", "R"), Fields(arrays=arrays, values={"n": _bent().n}))
+    write_artefact(found["mesh"], header("mesh", "R"), mesh_fields(_bent(), "R", {}))
     found["pose"] = write_pose(folder / "pose.h5")
     for stage, of in (("compress", ("calibrate", "mesh", "pose")), ("shape", ("mesh", "pose", "compress"))):
         found[stage] = run(stage, folder / stage, {name: getattr(found[name], "path", found[name]) for name in of})

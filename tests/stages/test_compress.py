@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from mammoreg.fem.parts.plane_ties import PlaneTies
-from mammoreg.geometry import breast_to_plate, lps_to_breast
+from mammoreg.geometry import breast_to_plate
 from mammoreg.meshing.locate import Locator
-from stages.compress import gland_map as tissue_map
-from stages.compress.record import resumed
-from stages.engine.artefact import Artefact, Fields, VolumeField, write_artefact
+from stages.compress import gland_map
+from stages.compress.record import CompressRecord
+from stages.engine.artefact import Artefact, write_artefact
 from stages.engine.contract import Inputs
+from stages.segment.record import SegmentRecord, segment_fields
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MU, pressed, run, write_pose, write_start
 from tests.stages.synthetic_case import header
 
@@ -140,7 +141,7 @@ def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, segm
 def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain, tmp_path, monkeypatch):
     told = inputs | {"segment": segment}
     with monkeypatch.context() as patch:
-        patch.setattr(tissue_map, "tissue_fraction", lambda *_: pytest.fail("made for homogeneous tissue"))
+        patch.setattr(gland_map, "tissue_fraction", lambda *_: pytest.fail("made for homogeneous tissue"))
         alike = run("compress", tmp_path, told)
     np.testing.assert_array_equal(_nodes(alike), _nodes(plain))
     assert "gland_fraction" not in alike.names()
@@ -154,15 +155,16 @@ def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain,
 
 
 def test_skin_counts_as_tissue_that_is_not_gland(segment, inputs, tmp_path):
-    told = Artefact(segment)
-    labels = told.volume("labels")
+    labels = SegmentRecord(Artefact(segment)).labels
     coded = labels.with_data(np.where(labels.data == 1, 3, labels.data).astype(np.uint8))  # all but the gland is skin
     skinned = tmp_path / "skin.h5"
-    write_artefact(skinned, header("segment", "R"), Fields(volumes={"labels": VolumeField(coded, "1", "labels")}))
+    write_artefact(
+        skinned, header("segment", "R"), segment_fields({"labels": coded}, MESH.points, MESH.points[0], "R", {})
+    )
     artefacts = {"segment": [Artefact(skinned)], "mesh": [Artefact(inputs["mesh"])]}
-    found = tissue_map.gland_share(Inputs(stages=artefacts))
+    found = gland_map.gland_share(Inputs(stages=artefacts))
     inside = np.argwhere(coded.data > 0)
-    element, _, kept = Locator(MESH.points, MESH.hexes()).locate(lps_to_breast(coded.to_world(inside), "R"))
+    element, _, kept = Locator(MESH.points, MESH.hexes()).locate(coded.to_world(inside))
     gland = (coded.data[tuple(inside.T)] == 2)[kept]
     counts = np.bincount(element[kept], minlength=len(found))
     share = np.bincount(element[kept], weights=gland, minlength=len(found)) / counts
@@ -192,10 +194,9 @@ def test_force_scales_with_the_stiffness(inputs, plain, tmp_path):
 
 
 def test_resumed_closing_is_what_compress_left(inputs, plain):
-    artefacts = {name: Artefact(path) for name, path in inputs.items()}
-    closing, closed = resumed(artefacts["mesh"], plain)
-    lift = np.array([0.0, 0.0, plain.value("lift_mm")])
-    np.testing.assert_allclose(closed.deformed + lift, _nodes(plain), atol=1e-12)
+    record = CompressRecord(plain)
+    closing, closed = record.resumed(MESH)
+    np.testing.assert_allclose(record.frame.to_plate(closed.deformed), _nodes(plain), atol=1e-12)
     idle = _idle()
     again = closing.rest(closed, idle, 0.05)
     assert np.abs(again.deformed - closed.deformed).max() < 0.15
@@ -251,7 +252,7 @@ def test_skin_sticks_where_friction_has_no_limit(inputs, plain, tmp_path):
     stuck = _with(inputs, tmp_path, friction=float("inf"))
     assert stuck.value("mechanics")["friction"] == "Infinity"
     assert stuck.value("force_n") > plain.value("force_n")
-    closing, closed = resumed(Artefact(inputs["mesh"]), stuck)
+    closing, closed = CompressRecord(stuck).resumed(MESH)
     assert closing.contact.sticks
     assert closed.force_n[0] == stuck.value("force_lower_n")
 
@@ -285,7 +286,7 @@ def test_skin_holds_the_breast_together(inputs, plain, tmp_path, skin):
     assert tight.value("force_n") > 1.02 * bare.value("force_n")
     assert tight.value("part_energies_mj")["Membrane"] > 0.0
     assert ("membrane" in tight.names()) is (skin != "attached")
-    closing, closed = resumed(Artefact(inputs["mesh"]), tight)
+    closing, closed = CompressRecord(tight).resumed(MESH)
     np.testing.assert_allclose(closed.deformed[:, 2] + tight.value("lift_mm"), _nodes(tight)[:, 2], atol=1e-9)
     again = closing.rest(closed, _idle(), 0.05)
     assert np.abs(again.deformed - closed.deformed).max() < 0.3

@@ -6,6 +6,7 @@ import pytest
 from mammoreg.geometry import breast_to_lps, breast_to_plate
 from stages.deformed import force_values, mesh_values
 from stages.engine.artefact import Artefact
+from stages.mesh.record import MeshRecord
 from tests.stages.synthetic_case import box, write_mesh
 
 ANGLE = 30.0
@@ -13,7 +14,7 @@ ANGLE = 30.0
 
 @pytest.fixture(params=["L", "R"])
 def mesh(request, tmp_path):
-    return Artefact(write_mesh(tmp_path / "mesh.h5", request.param))
+    return MeshRecord(Artefact(write_mesh(tmp_path / "mesh.h5", request.param)))
 
 
 def _turned():

@@ -13,8 +13,7 @@ from PIL import Image
 from mammoreg.geometry import breast_to_lps, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Artefact
-from stages.figures.exports import stored_image
-from stages.marks import canonical_image
+from stages.pose.record import PoseRecord
 from tests.stages import synthetic_case as synthetic
 from tests.stages.pictured_case import (
     LESION,
@@ -80,9 +79,9 @@ def test_the_predicted_lesion_on_the_mammogram_covers_the_marked_one(case: Case)
 
 def test_stored_and_canonical_masks_are_inverse(case: Case) -> None:
     folder, _, _ = case
-    pose = Artefact(folder / "pose.CC.h5")
+    pose = PoseRecord(Artefact(folder / "pose.CC.h5"))
     stored = read_picture(folder / "CC.png") > 0
-    np.testing.assert_array_equal(stored_image(pose, canonical_image(pose, stored)), stored)
+    np.testing.assert_array_equal(pose.stored_image(pose.canonical_image(stored)), stored)
 
 
 def test_itk_reads_the_displacement_in_lps(case: Case) -> None:

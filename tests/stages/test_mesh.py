@@ -5,13 +5,13 @@ import csv
 import numpy as np
 import pytest
 
-from mammoreg.geometry import breast_to_lps
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import volumes
 from stages.compress.gland_map import gland_share
-from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.artefact import Artefact, write_artefact
 from stages.engine.contract import Inputs, Subject
 from stages.engine.run import run_stage
+from stages.segment.record import segment_fields
 from tests.shared_data import DATA, requires_shared
 from tests.unit.breast_bodies import half_ellipsoid
 
@@ -20,16 +20,10 @@ def write_segment(path, laterality, points=None):
     mask, back, nipple = half_ellipsoid()
     labels = mask.data.copy()
     labels[mask.to_world(np.indices(mask.shape).transpose(1, 2, 3, 0))[..., 2] > 0] *= 2
-    volumes_ = {
-        "breast_mask": VolumeField(mask.to_lps(laterality), "1", "breast"),
-        "labels": VolumeField(mask.with_data(labels).to_lps(laterality), "1", "tissue"),
-    }
-    arrays = {
-        "chest_wall_surface": Array(breast_to_lps(back if points is None else points, laterality), "mm", "back"),
-        "nipple": Array(breast_to_lps(nipple, laterality), "mm", "nipple"),
-    }
+    volumes = {"breast_mask": mask, "labels": mask.with_data(labels)}
+    fields = segment_fields(volumes, back if points is None else points, nipple, laterality, {})
     header = {"stage": "segment", "case": "c", "view": "", "laterality": laterality, "artefact_id": "s", "status": "ok"}
-    write_artefact(path, header, Fields(arrays=arrays, volumes=volumes_))
+    write_artefact(path, header, fields)
     return path
 
 

@@ -5,10 +5,11 @@ import pytest
 
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.plates.closing import Closing
-from mammoreg.geometry import breast_to_lps
 from mammoreg.geometry.frames import plate_rotation
+from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.thickness import ThicknessEstimate
-from stages.engine.artefact import Array, Fields, write_artefact
+from stages.engine.artefact import write_artefact
+from stages.mesh.record import mesh_fields
 from stages.pose import start
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MIDDLE, ROW, pressed, run, write_mammogram, write_start
 from tests.stages.synthetic_case import header
@@ -131,8 +132,7 @@ def test_edge_without_an_image_lies_in_front_of_most_but_not_all_of_a_bent_back(
     points, back = MESH.points.copy(), MESH.back_nodes()
     points[:, 1] += 0.4 * (points[:, 2] - points[back, 2].min()) * (1.0 + points[:, 1] / 78.0)
     start = write_start(tmp_path)
-    arrays = {"points": Array(breast_to_lps(points, "R"), "mm", "nodes")}
-    write_artefact(start["mesh"], header("mesh", "R"), Fields(arrays=arrays, values={"n": MESH.n}))
+    write_artefact(start["mesh"], header("mesh", "R"), mesh_fields(BlockMesh(MESH.n, points), "R", {}))
     got = run("pose", tmp_path / "out", start, view="3D", row={"compression": "0.3"})
     assert got.ok, got.message
     faces = points[MESH.back_quads()]

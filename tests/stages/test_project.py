@@ -9,9 +9,11 @@ import pytest
 from mammoreg.geometry import Volume
 from mammoreg.materials.attenuation import ATTENUATION_20KEV_PER_MM
 from mammoreg.projection.cone_beam import project_volume
-from stages.engine.artefact import Array, Artefact, Fields, VolumeField, write_artefact
+from stages.engine.artefact import Artefact, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
+from stages.pose.record import PoseFields, PoseRecord
+from stages.segment.record import SegmentRecord, segment_fields
 from tests.stages.synthetic_case import (
     COLUMNS,
     DEPTH,
@@ -31,18 +33,15 @@ STEP = 3
 
 def _segment(path: Path, laterality):
     """Replace the segmentation by one with labels (fat around a ball of gland) and an MR volume."""
-    old = Artefact(path)
-    mask = old.volume("breast_mask").to_breast(laterality)
+    old = SegmentRecord(Artefact(path))
+    mask = old.breast_mask
     where = np.stack(np.meshgrid(*(np.arange(size) for size in mask.shape), indexing="ij"), axis=-1)
     gland = np.linalg.norm(mask.to_world(where) - GLAND, axis=-1) < 9.0
-    labels = mask.with_data((mask.data * np.where(gland, 2, 1)).astype(np.uint8)).to_lps(laterality)
+    labels = mask.with_data((mask.data * np.where(gland, 2, 1)).astype(np.uint8))
     mr = labels.with_data(np.where(labels.data == 2, 300.0, 900.0 * (labels.data > 0)).astype(np.float32))
-    volumes = {
-        "breast_mask": VolumeField(old.volume("breast_mask"), "1", "breast"),
-        "labels": VolumeField(labels, "1", "tissue"),
-        "mr": VolumeField(mr, "1", "MR"),
-    }
-    write_artefact(path, header("segment", laterality), Fields(volumes=volumes))
+    volumes = {"breast_mask": mask, "labels": labels, "mr": mr}
+    fields = segment_fields(volumes, old.chest_wall, old.nipple, laterality, {})
+    write_artefact(path, header("segment", laterality), fields)
 
 
 def _true_projection(view):
@@ -57,17 +56,16 @@ def _true_projection(view):
 
 
 def _add_mammogram(path: Path, laterality, view):
-    old = Artefact(path)
+    old = PoseRecord(Artefact(path))
     image = np.repeat(np.repeat(_true_projection(view), STEP, axis=0), STEP, axis=1)[:ROWS, :COLUMNS]
-    arrays = {
-        name: Array(old.array(name, units), units, name)
-        for name, units in [("rigid_matrix", "1"), ("rigid_offset", "mm"), ("scaling_matrix", "1"),
-                            ("scaling_offset", "mm")]
-    }  # fmt: skip
-    arrays["mammogram"] = Array(image.astype(np.float32), "1", "mammogram")
-    arrays["breast_mask"] = Array((image > 0.5).astype(np.uint8), "1", "breast")
-    values = {name: old.value(name) for name in old.value_names()}
-    write_artefact(path, header("pose", laterality, view), Fields(arrays=arrays, values=values))
+    pose = PoseFields(
+        view=old.geometry,
+        rigid=old.geometry,
+        maps={name: old.affine(name) for name in ("rigid", "scaling")},
+        mammogram=image.astype(np.float32),
+        tissue=(image > 0.5).astype(np.uint8),
+    )
+    write_artefact(path, header("pose", laterality, view), pose.fields())
 
 
 def _inputs(folder, laterality="R", view="CC"):

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.failures import Failure
 from stages.engine.run import run_stage
+from stages.localize.record import Predictions, mammogram_fields
 from stages.studies import chain
 from stages.studies.runtime import stage as runtime
 from stages.studies.runtime.comparison import view_results
@@ -30,9 +32,9 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Artefact]:
 
 def shifted(localize: Artefact, folder: Path, pixels: float) -> Artefact:
     """The same predictions, so many pixels further along the columns."""
-    rows = [row | {"column": row["column"] + pixels} for row in localize.value("mammogram_rows")]
+    rows = [replace(row, column=row.column + pixels) for row in Predictions(localize).mammogram_rows]
     path = folder / "localize.h5"
-    write_artefact(path, synthetic.header("localize", "R"), Fields(values={"mammogram_rows": rows}))
+    write_artefact(path, synthetic.header("localize", "R"), mammogram_fields(rows, [], []))
     return Artefact(path)
 
 

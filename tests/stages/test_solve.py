@@ -1,10 +1,13 @@
 """Stage `solve`: the interior under the estimated surface."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from stages.compress.record import kept_memory, memory_arrays
-from stages.engine.artefact import Array, Artefact, Fields, write_artefact
+from mammoreg.fem.plates.state import DampedState
+from stages.engine.artefact import Array, Artefact, write_artefact
+from stages.shape.record import ShapeRecord, shape_fields
 from tests.stages.pressed_case import MESH, run, write_pose, write_start
 from tests.stages.synthetic_case import header
 
@@ -24,11 +27,13 @@ def chain(tmp_path_factory):
 
 def _moved(path, shape, motion):
     """The shape's surface moved, and nothing else of it."""
-    names = (("surface_nodes", "1"), ("surface", "mm"), ("deformed", "mm"), ("pressure", "kPa"))
-    arrays = {name: Array(shape.array(name, units), units, name) for name, units in names}
-    arrays |= memory_arrays(kept_memory(shape))
-    arrays["surface"] = Array(shape.array("surface", "mm") + motion, "mm", "surface")
-    write_artefact(path, header("shape", "R", "CC"), Fields(arrays=arrays))
+    kept = ShapeRecord(shape)
+    nodes = kept.deformed.copy()
+    nodes[kept.surface_nodes] += motion
+    fields = shape_fields(kept.surface_nodes, nodes, DampedState(nodes, kept.pressure, 0.0, kept.memory), {})
+    # The solve starts from where the shape was, so that only the surface pulls.
+    arrays = {**fields.arrays, "deformed": Array(kept.deformed, "mm", "where the solve starts")}
+    write_artefact(path, header("shape", "R", "CC"), replace(fields, arrays=arrays))
     return path
 
 

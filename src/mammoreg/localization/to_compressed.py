@@ -1,6 +1,6 @@
 """Into a compressed MR volume: placing a surface by that volume's outline, never by its intensities."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -43,17 +43,17 @@ class SecondVolume:
         """Points (N, 3) of the undeformed breast by the best rigid fit of its skin."""
         return fit_surface_to_outline(self.skin, self.outline, rotate=True, base_mm=_RIGID_BASE_MM).forward(points)
 
-    def place(self, way: MethodView, drawn_mm: Sequence[float], points: Points) -> Points:
+    def place(self, way: MethodView, drawn_mm: Points, points: Points) -> Points:
         """Points (N, 3) of the undeformed breast where a method and the mask put them."""
         return drawn_to_breast(way, drawn_mm, points) + self.shift(way, drawn_mm)
 
-    def shift(self, way: MethodView, drawn_mm: Sequence[float]) -> Points:
+    def shift(self, way: MethodView, drawn_mm: Points) -> Points:
         """Displacement (3,) by which the mask places what a method has deformed."""
         surface = drawn_to_breast(way, drawn_mm, self.skin)
         return fit_surface_to_outline(surface, self.outline, rotate=False, base_mm=self.base_mm).offset
 
 
-def drawn_to_breast(way: MethodView, drawn: Sequence[float], points: Points) -> Points:
+def drawn_to_breast(way: MethodView, drawn: Points, points: Points) -> Points:
     """Points (N, 3) of the undeformed breast between the plates, breast frame, from where the breast was drawn to."""
     return plate_to_breast(way.deformation.forward(points) + np.asarray(drawn), way.geometry.angle_deg)
 

@@ -11,11 +11,12 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from mammoreg.imaging.mammogram_orientation import View
 from stages.engine.errors import Fault, FaultsError
+from stages.views import SECOND_VOLUME
 
 RESERVED = ("tables", "figures", "benchmarks", "logs", "digital")
 PICTURES = (".png", ".tif", ".tiff")
-PLAIN_VIEW = "3D"
 
 
 def _not_reserved(name: str) -> str:
@@ -74,7 +75,7 @@ class ViewRow(Row):
     """One mammogram."""
 
     case: CaseId
-    view: Literal["CC", "MLO"] = Field(description="projection")
+    view: View = Field(description="projection")
     image: Path = Field(description="DICOM mammogram, or .png/.tif with pixel_spacing_mm")
     lesion: Path | None = Field(
         None, description=".png mask of the image's size, or .tsv with name, column, row, diameter_mm"
@@ -130,7 +131,7 @@ class Cohort:
         """Views of a case: its mammograms, else 3D where a second volume or `compression` tells of plates."""
         found = sorted(view for name, view in self.mammograms if name == case)
         row = self.cases[case]
-        return found or ([PLAIN_VIEW] if row.mr_compressed or row.compression else [])
+        return found or ([SECOND_VOLUME] if row.mr_compressed or row.compression else [])
 
 
 def read_cohort(cases: Path, views: Path | None, files_in: Path | None = None) -> Cohort:

@@ -1,6 +1,7 @@
-"""The closing plates of stage `compress` as an object, built anew from artefacts by the stages that go on from it."""
+"""What stage `compress` leaves: the breast between two plates, whole enough for other stages to go on from it."""
 
-from dataclasses import asdict, fields, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,13 +12,18 @@ from mammoreg.breast.placed import PlacedBreast, closing_plates, place_breast
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.fem.plates.state import DampedState
-from stages.compress.gland_map import kept_gland_share
-from stages.engine.artefact import Artefact
-from stages.engine.contract import Array, Value
+from mammoreg.fem.report import SolveReport
+from mammoreg.geometry import ViewGeometry
+from mammoreg.geometry.frames import Points
+from mammoreg.meshing.block import BlockMesh
+from stages.deformed import FORCE_VALUES, MESH_VALUES, force_values, mesh_values
+from stages.engine.artefact import Array, Artefact, Fields, Value
+from stages.engine.record import Record
 from stages.mechanics import Mechanics
-from stages.methods import block_mesh
+from stages.mesh.record import MeshRecord
 
-Floats = NDArray[np.float64]
+GLAND_SHARE = "gland_fraction"
+"""Name of the shares of gland, here and in exported meshes."""
 _MEMORY = {
     "anchor": ("mm", "contact points at the last step, each plate"),
     "traction": ("kPa", "friction, each plate"),
@@ -27,38 +33,126 @@ _MEMORY = {
 _MEMBRANE = "membrane"
 
 
-def placed_again(mesh: Artefact, compress: Artefact) -> PlacedBreast:
-    """The breast as `compress` had it before the plates closed."""
-    mechanics = _kept_mechanics(compress)
-    angle_deg, mu_kpa = float(compress.value("angle_deg")), float(compress.value("mu_kpa"))
-    gland, compression = kept_gland_share(compress), float(compress.value("compression"))
-    return place_breast(block_mesh(mesh), angle_deg, mechanics, mu_kpa, gland, compression)
+@dataclass(frozen=True)
+class FloatingFrame:
+    """The plate frame as the numerics have it: a floating breast, whose plates come to lie where its back takes them.
+
+    Attributes:
+        lift_mm: how far above there the pose has seen the plates.
+    """
+
+    lift_mm: float
+
+    def to_plate(self, points: Points) -> Points:
+        """Points (..., 3) of this frame in the plate frame, mm."""
+        return np.asarray(points + self._lift)
+
+    def from_plate(self, points: Points) -> Points:
+        """Points (..., 3) of the plate frame in this one, mm."""
+        return np.asarray(points - self._lift)
+
+    @property
+    def _lift(self) -> Points:
+        return np.array([0.0, 0.0, self.lift_mm])
+
+    def view(self, view: ViewGeometry) -> ViewGeometry:
+        """A view of the plate frame in this one."""
+        return replace(view, height_mm=view.height_mm - self.lift_mm)
 
 
-def kept_values(
-    mechanics: Mechanics, options: ClosingOptions, mu_kpa: float, angle_deg: float, edge_p_mm: float
-) -> dict[str, Value]:
-    """What later stages need to know of a compression."""
+@dataclass(frozen=True)
+class CompressFields:
+    """What is to be kept of a compression.
+
+    Attributes:
+        closed: the breast between the plates, in the floating frame.
+        closing: the plates.
+        breast: what they closed on.
+        view: of the pose, whose plates the result is lifted to.
+        mesh: undeformed.
+        mechanics, mu_kpa, gland, compression: with which the breast was placed.
+    """
+
+    closed: Closed
+    closing: Closing
+    breast: PlacedBreast
+    view: ViewGeometry
+    mesh: MeshRecord
+    mechanics: Mechanics
+    mu_kpa: float
+    gland: NDArray[np.float64] | None
+    compression: float
+
+    def fields(self) -> Fields:
+        """The artefact's contents."""
+        closed, frame = self.closed, FloatingFrame(self.view.height_mm - self.closed.height_mm)
+        deformed = frame.to_plate(closed.deformed)
+        arrays = {
+            "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame"),
+            "residuals": Array(np.array(closed.residuals), "1", "unbalanced over internal forces, each iteration"),
+            **_state_arrays(closed, frame),
+        }
+        if self.gland is not None:
+            arrays[GLAND_SHARE] = Array(self.gland, "1", "gland's share of each hexahedron")
+        return Fields(
+            arrays=arrays,
+            values=closing_report(closed)
+            | mesh_values(self.mesh, deformed, self.view.angle_deg)
+            | self._setting(frame),
+        )
+
+    def _setting(self, frame: FloatingFrame) -> dict[str, Value]:
+        return {
+            "height_mm": self.view.height_mm,
+            "lift_mm": frame.lift_mm,
+            "known_lower_mm": self.closing.lower_mm,
+            "raised_mm": self.closed.state.height,
+            "uncompressed_mm": self.closing.uncompressed_mm,
+            "compression": self.compression,
+            "stiffness_ratio": self.breast.stiffness_ratio,
+            "mechanics": self.mechanics.plain(),
+            "options": asdict(self.closing.options),
+            "mu_kpa": self.mu_kpa,
+            "angle_deg": self.view.angle_deg,
+            "edge_p_mm": self.view.edge_p_mm,
+        }
+
+
+def closing_report(closed: Closed) -> dict[str, Value]:
+    """What happened in a compression."""
     return {
-        "mechanics": mechanics.plain(),
-        "options": asdict(options),
-        "mu_kpa": mu_kpa,
-        "angle_deg": angle_deg,
-        "edge_p_mm": edge_p_mm,
+        "thickness_mm": closed.gap_mm,
+        **force_values(closed.force_n),
+        "cut_steps": closed.cuts,
+        "last_motion_mm": closed.restless_mm,
+        "penetration_mm": closed.penetration_mm,
+        **report_values(closed.report),
     }
 
 
-def _kept_mechanics(compress: Artefact) -> BreastMechanics:
-    return Mechanics.model_validate(compress.value("mechanics")).numerics()
+def report_values(report: SolveReport | None) -> dict[str, Value]:
+    """What an artefact keeps of a solve's report: all but wall times, which differ from run to run."""
+    if report is None:
+        return {}
+    return {
+        "iterations": report.iterations,
+        "load_steps": report.steps,
+        "cut_steps": report.cuts,
+        "unbalance": report.unbalance,
+        "energy_mj": report.isochoric_mj,
+        "volumetric_energy_mj": report.volumetric_mj,
+        "part_energies_mj": dict(report.parts_mj),
+        "min_det_f": report.min_det_f,
+        "volume_change": report.volume_change,
+    }
 
 
-def kept_arrays(closed: Closed, lift: Floats) -> dict[str, Array]:
-    """The state of a breast between plates, from which `resumed` goes on; `lift` (3,) takes it to the pose's plates."""
-    kept = memory_arrays(closed.state.memory)
-    kept["pressure"] = Array(closed.state.pressure, "kPa", "element pressures, positive in tension")
-    if closed.extra is not None:
-        kept[_MEMBRANE] = Array(closed.extra + lift, "mm", "nodes of the skin's own membrane, plate frame")
-    return kept
+def seconds_text(report: SolveReport | None) -> str:
+    """Where the time of a solve went, for the log."""
+    if report is None:
+        return "no report of the solve"
+    parts = ", ".join(f"{name} {seconds:.2f}" for name, seconds in report.seconds.items())
+    return f"{report.iterations} Newton iterations in {report.steps} load steps; seconds: {parts}"
 
 
 def memory_arrays(memory: SoftMemory) -> dict[str, Array]:
@@ -69,55 +163,184 @@ def memory_arrays(memory: SoftMemory) -> dict[str, Array]:
 
 def kept_memory(artefact: Artefact) -> SoftMemory:
     """What contact points remember; an array is empty where the contact does not need it."""
-    names = {name: f"contact/{name}" for name in _MEMORY}
-    kept = {n: artefact.array(key, _MEMORY[n][0]) for n, key in names.items() if key in artefact.names()}
+    names, held = {name: f"contact/{name}" for name in _MEMORY}, artefact.names()
+    kept = {n: artefact.array(key, _MEMORY[n][0]) for n, key in names.items() if key in held}
     return SoftMemory(**{f.name: kept.get(f.name, np.zeros(0)) for f in fields(SoftMemory)})
 
 
-def closing_again(breast: PlacedBreast, compress: Artefact) -> Closing:
-    """The plates as `compress` had them around the breast that `placed_again` gives."""
-    mechanics = _kept_mechanics(compress)
-    options = replace(ClosingOptions(), **_options(compress.value("options")))
-    edge_p_mm = float(compress.value("edge_p_mm"))
-    return closing_plates(breast, edge_p_mm, mechanics, options, compress.value("known_lower_mm"))
+def _state_arrays(closed: Closed, frame: FloatingFrame) -> dict[str, Array]:
+    """The state from which `CompressRecord.resumed` goes on."""
+    kept = memory_arrays(closed.state.memory)
+    kept["pressure"] = Array(closed.state.pressure, "kPa", "element pressures, positive in tension")
+    if closed.extra is not None:
+        kept[_MEMBRANE] = Array(frame.to_plate(closed.extra), "mm", "nodes of the skin's own membrane, plate frame")
+    return kept
 
 
-def resumed(mesh: Artefact, compress: Artefact) -> tuple[Closing, Closed]:
-    """The plates and the breast between them as `compress` left them, in the floating breast's own height."""
-    closing = closing_again(placed_again(mesh, compress), compress)
-    state = _kept_state(compress, closing)
-    membrane = None if closing.extra_nodes is None else state.positions[-len(closing.extra_nodes) :]
-    closed = Closed(
-        deformed=state.positions[: len(closing.model.points)],
-        height_mm=compress.value("height_mm") - compress.value("lift_mm"),
-        gap_mm=compress.value("thickness_mm"),
-        force_n=(compress.value("force_lower_n"), compress.value("force_upper_n")),
-        iterations=0,
-        steps=0,
-        cuts=0,
-        residuals=[],
-        restless_mm=compress.value("last_motion_mm"),
-        min_det_f=compress.value("min_det_f"),
-        volume_change=compress.value("volume_change"),
-        penetration_mm=compress.value("penetration_mm"),
-        energy_mj=compress.value("energy_mj"),
-        state=state,
-        extra=membrane,
-    )
-    return closing, closed
+class SolutionRecord(Record):
+    """The breast between the plates as one of the stages with mechanics has solved it."""
+
+    @property
+    def deformed(self) -> Points:
+        """Mesh nodes (N, 3), plate frame, mm."""
+        return np.asarray(self.artefact.array("deformed", "mm"), dtype=float)
+
+    @property
+    def force_n(self) -> float | None:
+        """Mean force of both plates, which balance but for the back's share."""
+        forces = [self._given(f"force_{plate}_n") for plate in ("lower", "upper")]
+        known = [float(force) for force in forces if force is not None]
+        return sum(known) / len(known) if known else None
+
+    @property
+    def min_det_f(self) -> float | None:
+        """Smallest volume ratio at an integration point."""
+        smallest = self._given("min_det_f")
+        return None if smallest is None else float(smallest)
+
+    @property
+    def thickness_mm(self) -> float:
+        """Distance of the plates."""
+        return float(self.artefact.value("thickness_mm"))
+
+    @property
+    def penetration_mm(self) -> float | None:
+        """Deepest point of skin or back inside a plate."""
+        depth = self._given("penetration_mm")
+        return None if depth is None else float(depth)
+
+    @property
+    def folded_corners(self) -> int | None:
+        """Corners of elements that are turned inside out."""
+        count = self._given("folded_corners")
+        return None if count is None else int(count)
+
+    @property
+    def folded_share(self) -> float | None:
+        """Share of the elements with a folded corner."""
+        share = self._given("folded_share")
+        return None if share is None else float(share)
+
+    @property
+    def sideways_drift_mm(self) -> float | None:
+        """Mean sideways motion of the breast over its back."""
+        drift = self._given("sideways_drift_mm")
+        return None if drift is None else float(drift)
+
+    @property
+    def plate_forces_n(self) -> tuple[float, float]:
+        """Forces of the lower and the upper plate."""
+        lower, upper = (float(self.artefact.value(f"force_{plate}_n")) for plate in ("lower", "upper"))
+        return lower, upper
+
+    @property
+    def contact_lost(self) -> bool:
+        """Whether one plate has lost the breast."""
+        return bool(self._given("contact_lost", False))
+
+    def facts(self) -> dict[str, Value]:
+        """What a stage keeps that takes over the solution as it is."""
+        names = ("penetration_mm", "volume_change", "min_det_f", *FORCE_VALUES, *MESH_VALUES)
+        return {name: self.artefact.value(name) for name in names}
+
+    def report(self) -> Mapping[str, Any]:
+        """What the solve came to, by name."""
+        names = ("force_n", "iterations", "load_steps", "min_det_f", "volume_change")
+        return {name: self.artefact.value(name) for name in names}
 
 
-def _kept_state(compress: Artefact, closing: Closing) -> DampedState:
-    lift = np.array([0.0, 0.0, compress.value("lift_mm")])
-    nodes = [compress.array(n, "mm") for n in ("deformed", _MEMBRANE) if n in compress.names()]
-    positions = np.concatenate(nodes) - lift
-    return DampedState(
-        positions,
-        compress.array("pressure", "kPa"),
-        compress.value("raised_mm"),
-        kept_memory(compress),
-        tuple(part.renewed(positions) for part in closing.parts),
-    )
+class CompressRecord(SolutionRecord):
+    """A compression, from which later stages go on."""
+
+    @property
+    def mechanics(self) -> BreastMechanics:
+        """Tissue, plates and back."""
+        return Mechanics.model_validate(self.artefact.value("mechanics")).numerics()
+
+    @property
+    def frame(self) -> FloatingFrame:
+        """The frame of the numerics."""
+        return FloatingFrame(float(self.artefact.value("lift_mm")))
+
+    @property
+    def angle_deg(self) -> float:
+        """Projection angle."""
+        return float(self.artefact.value("angle_deg"))
+
+    @property
+    def raised_mm(self) -> float:
+        """Height of the plates in the floating frame above the middle of first touch."""
+        return float(self.artefact.value("raised_mm"))
+
+    @property
+    def compression(self) -> float:
+        """Share of the thickness between the plates that they have taken away."""
+        return float(self.artefact.value("compression"))
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """Shear modulus at the compression over the initial one."""
+        return float(self.artefact.value("stiffness_ratio"))
+
+    @property
+    def mu_kpa(self) -> float:
+        """Shear modulus of the homogeneous tissue."""
+        return float(self.artefact.value("mu_kpa"))
+
+    @property
+    def pressure(self) -> NDArray[np.float64]:
+        """Element pressures (E,), kPa, positive in tension."""
+        return self.artefact.array("pressure", "kPa")
+
+    @property
+    def gland_share(self) -> NDArray[np.float64] | None:
+        """Gland's share of each element (E,), None where the material did not ask for it."""
+        return self.artefact.array(GLAND_SHARE, "1") if GLAND_SHARE in self.artefact.names() else None
+
+    def placed(self, mesh: BlockMesh) -> PlacedBreast:
+        """The breast as it was before the plates closed."""
+        return place_breast(mesh, self.angle_deg, self.mechanics, self.mu_kpa, self.gland_share, self.compression)
+
+    def closing(self, breast: PlacedBreast) -> Closing:
+        """The plates around the breast that `placed` gives."""
+        value = self.artefact.value
+        options = replace(ClosingOptions(), **_options(value("options")))
+        return closing_plates(breast, float(value("edge_p_mm")), self.mechanics, options, value("known_lower_mm"))
+
+    def resumed(self, mesh: BlockMesh) -> tuple[Closing, Closed]:
+        """The plates and the breast between them as the stage left them, in the floating frame."""
+        value, closing = self.artefact.value, self.closing(self.placed(mesh))
+        state = self._state(closing)
+        membrane = None if closing.extra_nodes is None else state.positions[-len(closing.extra_nodes) :]
+        closed = Closed(
+            deformed=state.positions[: len(closing.model.points)],
+            height_mm=value("height_mm") - self.frame.lift_mm,
+            gap_mm=self.thickness_mm,
+            force_n=(value("force_lower_n"), value("force_upper_n")),
+            iterations=0,
+            steps=0,
+            cuts=0,
+            residuals=[],
+            restless_mm=value("last_motion_mm"),
+            min_det_f=value("min_det_f"),
+            volume_change=value("volume_change"),
+            penetration_mm=value("penetration_mm"),
+            energy_mj=value("energy_mj"),
+            state=state,
+            extra=membrane,
+        )
+        return closing, closed
+
+    def _state(self, closing: Closing) -> DampedState:
+        nodes = [self.artefact.array(n, "mm") for n in ("deformed", _MEMBRANE) if n in self.artefact.names()]
+        positions = self.frame.from_plate(np.concatenate(nodes))
+        return DampedState(
+            positions,
+            self.pressure,
+            self.raised_mm,
+            kept_memory(self.artefact),
+            tuple(part.renewed(positions) for part in closing.parts),
+        )
 
 
 def _options(kept: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from stages.engine.artefact import Artefact, Fields, Value, write_artefact
+from stages.engine.artefact import Artefact, Fields, Value, first_failure, write_artefact
 from stages.engine.contract import Inputs, Stage, Subject
 from stages.engine.errors import UserError
 from stages.engine.failures import Failure, failure_of
@@ -117,7 +117,8 @@ def content_id(path: Path) -> str:
 
 def _outcome(stage: Stage, inputs: Inputs, settings: BaseModel, subject: Subject) -> Fields:
     """What the stage comes to, or in its place the failure, of an input or its own, that later stages carry on."""
-    failure = None if stage.takes_failed else _failed_before(inputs)
+    given = (artefact for found in inputs.stages.values() for artefact in found)
+    failure = None if stage.takes_failed else first_failure(given)
     if failure is not None:
         return _without_result(stage, inputs, failure)
     try:
@@ -129,11 +130,6 @@ def _outcome(stage: Stage, inputs: Inputs, settings: BaseModel, subject: Subject
         # A user's log tells of bad data too; on a terminal only a bug is worth a traceback.
         _LOG.log(logging.ERROR if failure.status == "bug" else logging.INFO, "%s", failure, exc_info=True)
         return _without_result(stage, inputs, replace(failure, message=_without_folders(failure.message, inputs)))
-
-
-def _failed_before(inputs: Inputs) -> Failure | None:
-    """The failure of the first input that did not end well."""
-    return next((a.failure for found in inputs.stages.values() for a in found if a.failure), None)
 
 
 def _without_result(stage: Stage, inputs: Inputs, failure: Failure) -> Fields:

@@ -10,23 +10,21 @@ from mammoreg.meshing.block import BlockMesh
 from mammoreg.metrics.elongation import Direction, extents_mm
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
-from stages.engine.artefact import Artefact
-from stages.evaluate.fit import has_outline
-from stages.evaluate.predictions import Row
-from stages.methods import FINE_RAYS, pose_outline, view_geometry
+from stages.evaluate.record import Row
+from stages.pose.record import FINE_RAYS, PoseRecord
 
 _METHODS = ("scaling", "plate", "updated")
 
 
-def elongation_rows(pose: Artefact, block: BlockMesh, methods: Mapping[str, MethodView]) -> list[Row]:
+def elongation_rows(pose: PoseRecord, block: BlockMesh, methods: Mapping[str, MethodView]) -> list[Row]:
     """Extents of each method's silhouette less those of the undeformed breast, and the mammogram's less the same.
 
     All are measured on the rays on which the mammogram's outline is skin, and divided by the magnification at the
     plates' middle; the undeformed breast is projected in parallel at the view's angle.
     """
-    if not has_outline(pose):
+    if not pose.has_outline:
         return []
-    geometry, outline = view_geometry(pose), pose_outline(pose, FINE_RAYS)
+    geometry, outline = pose.geometry, pose.outline(FINE_RAYS)
     standing = replace(geometry, parallel=True)
     before = _extents(outline, breast_to_plate(block.points, geometry.angle_deg), block, standing)
     true = extents_mm(outline.points(), outline.theta, outline.weight)
@@ -36,7 +34,7 @@ def elongation_rows(pose: Artefact, block: BlockMesh, methods: Mapping[str, Meth
         for direction in before:
             elongation = _difference(after[direction], before[direction], geometry)
             known = _difference(true[direction], before[direction], geometry)
-            row = {"view": str(pose.view), "method": method, "direction": direction}
+            row = {"view": pose.view, "method": method, "direction": direction}
             rows.append(row | {"elongation_mm": elongation, "true_mm": known})
     return rows
 

@@ -5,19 +5,22 @@ from dataclasses import dataclass
 
 from mammoreg.geometry import ViewGeometry
 from mammoreg.localization.deformation import MethodView
+from mammoreg.materials.cube import SULLIVAN
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.metrics.outline_fit import outline_fit
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
+from stages.compress.record import CompressRecord, SolutionRecord
 from stages.engine.artefact import Artefact
 from stages.evaluate.mechanical_doubts import MechanicalLimits, mechanical_doubts
-from stages.evaluate.predictions import Row
-from stages.methods import FINE_RAYS, MESH_METHODS, of_view, pose_outline
+from stages.evaluate.record import Row
+from stages.methods import MESH_METHODS, of_view
+from stages.pose.record import FINE_RAYS, PoseRecord
+from stages.project.record import ProjectRecord
+from stages.views import SECOND_VOLUME
 
 COMPRESSION_POINTS = 3.0
 """Beyond this difference of the table's `compression` from what is seen, in percent, the view is marked."""
-SULLIVAN_N = (49.0, 186.0)
-"""Range of compression forces measured by Sullivan et al. (paper, section II-B)."""
 
 
 @dataclass(frozen=True)
@@ -39,13 +42,8 @@ class Limits:
     compression: float | None = None
 
 
-def has_outline(pose: Artefact) -> bool:
-    """Whether a view has an outline: not if it has neither image nor second volume."""
-    return "outline" in pose.names()
-
-
 def fit_rows(
-    pose: Artefact,
+    pose: PoseRecord,
     block: BlockMesh,
     methods: Mapping[str, MethodView],
     results: list[Artefact],
@@ -58,18 +56,21 @@ def fit_rows(
         results: artefacts of `compress`, `solve` and `project`.
         beam_gaps: largest gap of the beams to a lesion, by method.
     """
-    outline, view = pose_outline(pose, FINE_RAYS) if has_outline(pose) else None, str(pose.view)
-    remarks = [*pose.value("flags"), *_other_compression(pose, results, limits.compression)]
+    outline, view = pose.outline(FINE_RAYS) if pose.has_outline else None, pose.view
+    projected, pressed = (of_view(results, stage, view) for stage in ("project", "compress"))
+    compress = None if pressed is None else CompressRecord(pressed)
+    remarks = [*pose.flags, *_other_compression(pose, compress, limits.compression)]
     rows = []
     for method, way in methods.items():
-        solution = of_view([a for a in results if a.stage == MESH_METHODS.get(method)], view)
+        solved = of_view(results, MESH_METHODS.get(method), view)
+        solution = None if solved is None else SolutionRecord(solved)
         row: Row = {"view": view, "method": method, **_placed(way.geometry, pose.laterality)}
-        row |= {"force_n": _plate_force(solution)} | _fit_columns(outline, block, way)
-        row["ncc"] = _number(of_view([a for a in results if a.stage == "project"], view), f"{method}_ncc")
+        row |= {"force_n": None if solution is None else solution.force_n} | _fit_columns(outline, block, way)
+        row["ncc"] = None if projected is None else ProjectRecord(projected).correlation(method)
         row["outline_step"] = None
-        row |= {name: _number(solution, name) for name in ("penetration_mm", "folded_corners")}
-        row["estimated"] = "; ".join(pose.value("estimated"))
-        compress = of_view([a for a in results if a.stage == "compress"], view)
+        row["penetration_mm"] = None if solution is None else solution.penetration_mm
+        row["folded_corners"] = None if solution is None else solution.folded_corners
+        row["estimated"] = "; ".join(pose.estimated)
         doubts = _doubts(row, solution, beam_gaps.get(method), limits)
         doubts += mechanical_doubts(solution, compress, limits.mechanical)
         row["trust"] = "; ".join([*remarks, *doubts])
@@ -102,36 +103,24 @@ def _fit_columns(outline: RadialOutline | None, block: BlockMesh, way: MethodVie
     }
 
 
-def _doubts(row: Row, solution: Artefact | None, gap_mm: float | None, limits: Limits) -> list[str]:
-    force, misfit, det_f = row["force_n"], row["outline_p95_mm"], _number(solution, "min_det_f")
+def _doubts(row: Row, solution: SolutionRecord | None, gap_mm: float | None, limits: Limits) -> list[str]:
+    force, misfit, det_f = row["force_n"], row["outline_p95_mm"], None if solution is None else solution.min_det_f
+    usual = f"{SULLIVAN.lowest_n:.0f}-{SULLIVAN.highest_n:.0f} N"
     doubts = {
         f"outline misfit {misfit or 0:.1f} mm": misfit is not None and misfit > limits.outline_p95_mm,
-        f"force {force or 0:.0f} N outside {SULLIVAN_N[0]:.0f}-{SULLIVAN_N[1]:.0f} N": force is not None
-        and not SULLIVAN_N[0] <= force <= SULLIVAN_N[1],
+        f"force {force or 0:.0f} N outside {usual}": force is not None and not SULLIVAN.holds(force),
         f"low Jacobian {det_f or 0:.2f}": det_f is not None and det_f < limits.min_det_f,
         f"beams miss each other by {gap_mm or 0:.1f} mm": gap_mm is not None and gap_mm > limits.beam_gap_mm,
     }
     return [text for text, holds in doubts.items() if holds]
 
 
-def _other_compression(pose: Artefact, results: list[Artefact], told: float | None) -> list[str]:
+def _other_compression(pose: PoseRecord, compress: CompressRecord | None, told: float | None) -> list[str]:
     """The doubt where the table's compression is not what the mammogram or the second volume shows."""
-    compress = of_view([a for a in results if a.stage == "compress"], str(pose.view))
-    seen = _number(compress, "compression")
-    if told is None or seen is None or not has_outline(pose):
+    if told is None or compress is None or not pose.has_outline:
         return []
+    seen = compress.compression
     if abs(told - seen) * 100.0 <= COMPRESSION_POINTS:
         return []
-    what = "second volume" if pose.view == "3D" else "mammogram"
+    what = "second volume" if pose.view == SECOND_VOLUME else "mammogram"
     return [f"compression {100 * told:.0f} % in the cases table, {100 * seen:.0f} % in the {what}"]
-
-
-def _plate_force(solution: Artefact | None) -> float | None:
-    """Mean force of both plates, which balance but for the back's share."""
-    forces = [_number(solution, f"force_{plate}_n") for plate in ("lower", "upper")]
-    known = [force for force in forces if force is not None]
-    return sum(known) / len(known) if known else None
-
-
-def _number(artefact: Artefact | None, name: str) -> float | None:
-    return float(artefact.value(name)) if artefact is not None and name in artefact.value_names() else None

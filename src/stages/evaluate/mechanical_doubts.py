@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from stages.engine.artefact import Artefact
+from stages.compress.record import SolutionRecord
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,9 @@ class MechanicalLimits:
     drift: float
 
 
-def mechanical_doubts(solution: Artefact | None, compress: Artefact | None, limits: MechanicalLimits) -> list[str]:
+def mechanical_doubts(
+    solution: SolutionRecord | None, compress: SolutionRecord | None, limits: MechanicalLimits
+) -> list[str]:
     """Facts that speak against a solution, in words.
 
     Args:
@@ -31,24 +33,18 @@ def mechanical_doubts(solution: Artefact | None, compress: Artefact | None, limi
     """
     if solution is None:
         return []
-    thickness_mm = _number(solution, "thickness_mm")
-    deep_mm, corners = _number(solution, "penetration_mm"), int(_number(solution, "folded_corners"))
-    share, drift_mm = _number(solution, "folded_share"), _number(compress, "sideways_drift_mm")
+    deep_mm, corners = solution.penetration_mm or 0.0, solution.folded_corners or 0
+    share, drift_mm = solution.folded_share or 0.0, (compress.sideways_drift_mm if compress else None) or 0.0
     doubts = {
-        f"skin or back {deep_mm:.1f} mm inside a plate": deep_mm > limits.penetration * thickness_mm,
+        f"skin or back {deep_mm:.1f} mm inside a plate": deep_mm > limits.penetration * solution.thickness_mm,
         f"{corners} folded corners in {share:.0%} of the elements": share > limits.folded,
-        f"breast tipped sideways by {abs(drift_mm):.1f} mm": abs(drift_mm) > limits.drift * thickness_mm,
-        _lost(solution): "contact_lost" in solution.value_names() and bool(solution.value("contact_lost")),
+        f"breast tipped sideways by {abs(drift_mm):.1f} mm": abs(drift_mm) > limits.drift * solution.thickness_mm,
+        _lost(solution): solution.contact_lost,
     }
     return [text for text, holds in doubts.items() if holds]
 
 
-def _lost(solution: Artefact) -> str:
-    lower, upper = (_number(solution, f"force_{plate}_n") for plate in ("lower", "upper"))
+def _lost(solution: SolutionRecord) -> str:
+    lower, upper = solution.plate_forces_n
     plate = "lower" if lower < upper else "upper"
     return f"contact with the {plate} plate lost ({min(lower, upper):.1f} N, the other {max(lower, upper):.1f} N)"
-
-
-def _number(artefact: Artefact | None, name: str) -> float:
-    """A value, 0 where the artefact does not hold it."""
-    return float(artefact.value(name)) if artefact is not None and name in artefact.value_names() else 0.0

@@ -8,16 +8,17 @@ from mammoreg.geometry.frames import Points
 from mammoreg.localization.lesions import LesionArea, MrLesion
 from mammoreg.metrics.distances import detector_distance_mm, distance_to_curve_mm
 from mammoreg.metrics.overlap import Overlap, overlap_of_areas, overlap_of_volumes
-from stages.engine.artefact import Artefact
-from stages.evaluate.predictions import Predictions, Row
-from stages.marks import canonical_pixels
-from stages.methods import METHODS, view_geometry
+from stages.evaluate.record import Row
+from stages.localize.record import MammogramRow, MrRow, Predictions
+from stages.methods import METHODS
+from stages.pose.record import PoseRecord
+from stages.views import SECOND_VOLUME
 
 _NO_OVERLAP: Row = {"overlap_percent": None, "dice": None, "size_ratio": None}
 
 
 def lesion_rows_in_mammogram(
-    predictions: Predictions, view: str, pose: Artefact | None, areas: Mapping[str, LesionArea], names: list[str]
+    predictions: Predictions, view: str, pose: PoseRecord | None, areas: Mapping[str, LesionArea], names: list[str]
 ) -> list[Row]:
     """Table V of one view; a lesion without prediction has empty numbers.
 
@@ -39,7 +40,7 @@ def lesion_rows_in_mammogram(
 
 
 def landmark_rows_in_mammogram(
-    predictions: Predictions, view: str, pose: Artefact | None, truth: Mapping[str, Points]
+    predictions: Predictions, view: str, pose: PoseRecord | None, truth: Mapping[str, Points]
 ) -> list[Row]:
     """Distances of one view's landmarks; `truth` holds stored pixels (column, row) of those the MR volume marks too."""
     rows = []
@@ -48,7 +49,7 @@ def landmark_rows_in_mammogram(
             found = predictions.in_mammogram(view, method, name)
             distance = None
             if pose is not None and found is not None:
-                distance = _pixel_distance(pose, found, canonical_pixels(pose, pixel))
+                distance = _pixel_distance(pose, found, pose.canonical_pixels(pixel))
             rows.append({"view": view, "method": method, "landmark": name, "distance_mm": distance})
     return rows
 
@@ -66,10 +67,10 @@ def lesion_rows_in_mr(
     for method in METHODS:
         for name, views in views_of.items():
             found = predictions.in_mr(method, name)
-            if found is None or found["views"] != "+".join(views):
+            if found is None or found.views != "+".join(views):
                 rows.append(_mr_row("+".join(views), method, name))
             if found is not None:
-                rows.append(_mr_row(found["views"], method, name) | _mr_numbers(predictions, found, lesions[name]))
+                rows.append(_mr_row(found.views, method, name) | _mr_numbers(predictions, found, lesions[name]))
     return rows
 
 
@@ -78,10 +79,10 @@ def _mr_row(views: str, method: str, name: str) -> Row:
     return {"views": views, "method": method, "name": name, **empty}
 
 
-def _mr_numbers(predictions: Predictions, found: Row, lesion: MrLesion) -> Row:
+def _mr_numbers(predictions: Predictions, found: MrRow, lesion: MrLesion) -> Row:
     """Distance and overlap of a lesion; the distance to the curve where one view alone was used."""
-    method, name, views = found["method"], found["name"], found["views"]
-    numbers: Row = {"distance_mm": float(np.linalg.norm(_point(found) - lesion.centre))}
+    method, name, views = found.method, found.name, found.views
+    numbers: Row = {"distance_mm": float(np.linalg.norm(found.point - lesion.centre))}
     numbers |= _overlap(overlap_of_volumes(predictions.region(method, name), lesion))
     if "+" not in views:
         numbers["distance_to_curve_mm"] = distance_to_curve_mm(lesion.centre, predictions.curve(method, name, views))
@@ -109,23 +110,19 @@ def landmark_rows_in_compressed(
     for method in METHODS:
         for name, true in truth.items():
             found = predictions.in_compressed(method, name)
-            distance = None if found is None else float(np.linalg.norm(_point(found) - true))
+            distance = None if found is None else float(np.linalg.norm(found.point - true))
             rows.append(_landmark_3d(method, name, distance))
     return rows
 
 
 def _landmark_3d(method: str, name: str, distance_mm: float | None) -> Row:
-    return {"view": "3D", "method": method, "landmark": name, "distance_mm": distance_mm}
+    return {"view": SECOND_VOLUME, "method": method, "landmark": name, "distance_mm": distance_mm}
 
 
-def _pixel_distance(pose: Artefact, found: Row, true: Points) -> float:
-    predicted = canonical_pixels(pose, np.array([found["column"], found["row"]]))
-    return float(detector_distance_mm(predicted, true, view_geometry(pose)))
+def _pixel_distance(pose: PoseRecord, found: MammogramRow, true: Points) -> float:
+    predicted = pose.canonical_pixels(found.pixel)
+    return float(detector_distance_mm(predicted, true, pose.geometry))
 
 
 def _overlap(overlap: Overlap) -> Row:
     return {"overlap_percent": overlap.overlap_percent, "dice": overlap.dice, "size_ratio": overlap.size_ratio}
-
-
-def _point(row: Row) -> Points:
-    return np.array([row["x"], row["y"], row["z"]])

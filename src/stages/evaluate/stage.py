@@ -1,9 +1,12 @@
 """Stage `evaluate`: predictions against the truth that the tables name; it alone reads both sides."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 from pydantic import Field
 
-from mammoreg.localization.deformation import ReferenceMesh
-from stages.engine.artefact import Fields
+from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_landmarks, view_lesion_names
+from stages.engine.artefact import Fields, first_failure
 from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
 from stages.evaluate.elongation import elongation_rows
 from stages.evaluate.fit import Limits, fit_rows
@@ -14,11 +17,13 @@ from stages.evaluate.places import (
     lesion_rows_in_mammogram,
     lesion_rows_in_mr,
 )
-from stages.evaluate.predictions import Predictions, Row
-from stages.marks import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_landmarks, view_lesion_names
-from stages.methods import METHODS, block_mesh, method_views, of_view
+from stages.evaluate.record import EvaluateFields, Row
+from stages.localize.record import Predictions
+from stages.mesh.record import MeshRecord
+from stages.methods import METHODS, method_views, of_view
+from stages.pose.record import PoseRecord
+from stages.views import IMAGED
 
-IMAGED = ("CC", "MLO")
 _PER_VIEW = ("pose", "compress", "shape", "solve", "project")
 
 
@@ -54,32 +59,31 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Compare every prediction that has a truth; one that failed is a row with an empty distance."""
     artefacts = [a for name in ("segment", "mesh", *_PER_VIEW, "localize") for a in inputs.artefacts(name)]
-    values = _against_truth(inputs, Predictions(inputs.artefact("localize")))
+    found = _against_truth(inputs, Predictions(inputs.artefact("localize")))
     if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
-        values |= _per_view(inputs, settings, subject)
-    return Fields(values=values, failure=next((a.failure for a in artefacts if a.failure), None))
+        found.view_rows, found.elongation_rows = _per_view(inputs, settings, subject)
+    return replace(found.fields(), failure=first_failure(artefacts))
 
 
-def without_result(inputs: Inputs, failure: Failure) -> dict[str, Value]:
+def without_result(inputs: Inputs, failure: Failure) -> Mapping[str, Value]:
     """Rows with empty distances of all that has a truth."""
-    return _against_truth(inputs, Predictions(None))
+    return _against_truth(inputs, Predictions(None)).fields().values
 
 
-def _against_truth(inputs: Inputs, predictions: Predictions) -> dict[str, Value]:
-    return {
-        "table_5_rows": _table_5(inputs, predictions),
-        "table_6_rows": _table_6(inputs, predictions),
-        "landmark_rows": _landmarks(inputs, predictions),
-        "view_rows": [],
-        "elongation_rows": [],
-    }
+def _against_truth(inputs: Inputs, predictions: Predictions) -> EvaluateFields:
+    return EvaluateFields(_table_5(inputs, predictions), _table_6(inputs, predictions), _landmarks(inputs, predictions))
+
+
+def _pose(inputs: Inputs, view: str) -> PoseRecord | None:
+    found = of_view(inputs.artefacts("pose"), "pose", view)
+    return None if found is None else PoseRecord(found)
 
 
 def _table_5(inputs: Inputs, predictions: Predictions) -> list[Row]:
     lesions = mr_lesion_names(inputs)
     rows: list[Row] = []
     for view in IMAGED:
-        pose = of_view(inputs.artefacts("pose"), view)
+        pose = _pose(inputs, view)
         names = [name for name in view_lesion_names(inputs, view) if name in lesions]
         # A mask that stopped `localize` is not opened again: the trouble is told once.
         compared = pose is not None and any(predictions.in_mammogram(view, m, n) for m in METHODS for n in names)
@@ -91,7 +95,7 @@ def _table_5(inputs: Inputs, predictions: Predictions) -> list[Row]:
 def _table_6(inputs: Inputs, predictions: Predictions) -> list[Row]:
     known = mr_lesion_names(inputs)
     marked = {view: view_lesion_names(inputs, view) for view in IMAGED}
-    views_of = {name: [view for view in IMAGED if name in marked[view]] for name in known}
+    views_of: dict[str, list[str]] = {name: [view for view in IMAGED if name in marked[view]] for name in known}
     views_of = {name: views for name, views in views_of.items() if views}
     compared = any(predictions.in_mr(method, name) for method in METHODS for name in views_of)
     return lesion_rows_in_mr(predictions, mr_lesions(inputs) if compared else {}, views_of)
@@ -102,13 +106,13 @@ def _landmarks(inputs: Inputs, predictions: Predictions) -> list[Row]:
     rows: list[Row] = []
     for view in IMAGED:
         truth = {n: p for n, p in view_landmarks(inputs, view).items() if n in before}
-        rows += landmark_rows_in_mammogram(predictions, view, of_view(inputs.artefacts("pose"), view), truth)
+        rows += landmark_rows_in_mammogram(predictions, view, _pose(inputs, view), truth)
     compressed = mr_landmarks(inputs, "mr_compressed_landmarks")
     truth = {n: p for n, p in compressed.items() if n in before}
     return rows + landmark_rows_in_compressed(predictions, before, truth)
 
 
-def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> dict[str, list[Row]]:
+def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[list[Row], list[Row]]:
     """Fit and elongation of each view whose pose is known."""
     results = [a for name in ("compress", "solve", "project") for a in inputs.artefacts(name)]
     mechanical = MechanicalLimits(settings.penetration_limit, settings.folded_limit, settings.drift_limit)
@@ -120,17 +124,17 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> dict[str,
         subject.number("compression"),
     )
     gaps = Predictions(inputs.artefact("localize")).beam_gaps()
-    block = block_mesh(inputs.artefact("mesh"))
-    reference = ReferenceMesh(block.points, block.hexes())
+    mesh = MeshRecord(inputs.artefact("mesh"))
     fits: list[Row] = []
     elongations: list[Row] = []
-    for pose in sorted((p for p in inputs.artefacts("pose") if p.ok), key=lambda p: str(p.view)):
-        methods = method_views(pose, reference, results)
-        fits += fit_rows(pose, block, methods, results, gaps, limits)
-        elongations += elongation_rows(pose, block, methods)
+    poses = (PoseRecord(artefact) for artefact in inputs.artefacts("pose") if artefact.ok)
+    for pose in sorted(poses, key=lambda pose: pose.view):
+        methods = method_views(pose, mesh.reference, results)
+        fits += fit_rows(pose, mesh.block, methods, results, gaps, limits)
+        elongations += elongation_rows(pose, mesh.block, methods)
     for row in (row for row in fits if row["trust"]):
         print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
-    return {"view_rows": fits, "elongation_rows": elongations}
+    return fits, elongations
 
 
 STAGE = Stage(

@@ -5,14 +5,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from mammoreg.geometry.frames import Laterality
-from mammoreg.localization.deformation import MethodView, ReferenceMesh
+from mammoreg.localization.deformation import MethodView
 from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Inputs
-from stages.evaluate.predictions import Predictions
-from stages.methods import METHODS, block_mesh, method_views
+from stages.localize.record import Predictions
+from stages.mesh.record import MeshRecord
+from stages.methods import METHODS, method_views
+from stages.pose.record import PoseRecord
+from stages.project.record import ProjectRecord
+from stages.segment.record import SegmentRecord
+from stages.views import IMAGED
 
-IMAGED = ("CC", "MLO")
 BEST_FIRST = tuple(reversed(METHODS))
 
 
@@ -34,49 +38,55 @@ class PicturedCase:
         return Predictions(self.inputs.artefact("localize")) if self.inputs.has("localize") else None
 
     @cached_property
+    def segment(self) -> SegmentRecord | None:
+        """The segmented breast, None if that failed."""
+        found = self.ok("segment")
+        return SegmentRecord(found) if found else None
+
+    @cached_property
     def mr_lesions(self) -> list[str]:
         """Names of the lesions marked in the MR volume."""
-        return self._listed("mr_lesion_names")
+        return self.predictions.mr_lesions if self.predictions else []
 
     @cached_property
     def mammogram_lesions(self) -> list[str]:
         """Names of the lesions marked in the mammograms."""
-        return self._listed("mammogram_lesion_names")
-
-    def _listed(self, name: str) -> list[str]:
-        found = [a.value(name) for a in self.inputs.artefacts("localize") if a.has(name)]
-        return list(found[0]) if found else []
+        return self.predictions.mammogram_lesions if self.predictions else []
 
     @cached_property
-    def poses(self) -> dict[str, Artefact]:
+    def poses(self) -> dict[str, PoseRecord]:
         """Poses that ended well, by view, CC first."""
-        found = [pose for pose in self.inputs.artefacts("pose") if pose.ok]
-        return {str(pose.view): pose for pose in sorted(found, key=lambda pose: str(pose.view))}
+        found = [PoseRecord(pose) for pose in self.inputs.artefacts("pose") if pose.ok]
+        return {pose.view: pose for pose in sorted(found, key=lambda pose: pose.view)}
 
     @cached_property
-    def imaged(self) -> dict[str, Artefact]:
+    def imaged(self) -> dict[str, PoseRecord]:
         """Poses of the views with a mammogram."""
         return {view: pose for view, pose in self.poses.items() if view in IMAGED}
 
     @cached_property
+    def mesh(self) -> MeshRecord | None:
+        """The undeformed mesh, None if there is none."""
+        found = self.ok("mesh")
+        return MeshRecord(found) if found else None
+
+    @property
     def block(self) -> BlockMesh | None:
         """The undeformed mesh in the breast frame."""
-        mesh = self.ok("mesh")
-        return block_mesh(mesh) if mesh else None
+        return self.mesh.block if self.mesh else None
 
     @cached_property
     def methods(self) -> dict[str, dict[str, MethodView]]:
         """Methods by view and name; none without a mesh."""
-        if self.block is None:
+        if self.mesh is None:
             return {}
-        reference = ReferenceMesh(self.block.points, self.block.hexes())
         solutions = [*self.inputs.artefacts("compress"), *self.inputs.artefacts("solve")]
-        return {view: method_views(pose, reference, solutions) for view, pose in self.poses.items()}
+        return {view: method_views(pose, self.mesh.reference, solutions) for view, pose in self.poses.items()}
 
-    def projection(self, view: str) -> Artefact | None:
-        """Artefact of `project` for a view; one whose solve failed still has the other methods."""
+    def projection(self, view: str) -> ProjectRecord | None:
+        """Projections of a view; one whose solve failed still has the other methods."""
         found = [artefact for artefact in self.inputs.artefacts("project") if artefact.view == view]
-        return found[0] if found else None
+        return ProjectRecord(found[0]) if found else None
 
 
 def first_of(wanted: Sequence[str], offered: Container[str]) -> str | None:

@@ -1,7 +1,6 @@
 """Files of a case that other programs open (3D Slicer, ParaView), by name inside its folder `export`."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +8,10 @@ from numpy.typing import NDArray
 from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality, Points, plate_rotation
 from mammoreg.meshing.block import BlockMesh
-from stages.compress.gland_map import GLAND_SHARE, kept_gland_share
-from stages.engine.artefact import Artefact
+from stages.compress.record import GLAND_SHARE, CompressRecord
 from stages.figures.case import PicturedCase
 from stages.formats.files import mask_png, mr_grid, nifti_bytes, on_grid, volume_affine, vtu_bytes
-from stages.marks import canonical_pixels
+from stages.mesh.record import lps_hexes
 from stages.methods import MESH_METHODS
 
 _DISPLACEMENT_INTENT = 1006
@@ -63,8 +61,8 @@ def _deformed_volumes(case: PicturedCase, methods: Mapping[str, str]) -> dict[st
     files = {}
     for view, method in methods.items():
         projected = case.projection(view)
-        if projected is not None and f"{method}/mr" in projected.volume_names():
-            volume = projected.volume(f"{method}/mr", frame="plate")
+        volume = None if projected is None else projected.deformed_mr(method)
+        if volume is not None:
             turned = plate_to_lps_affine(case.methods[view][method].geometry.angle_deg, case.laterality)
             data = volume.data.astype(np.float32)
             files[f"mr_{view}_{method}.nii.gz"] = nifti_bytes(data, turned @ volume_affine(volume))
@@ -73,11 +71,11 @@ def _deformed_volumes(case: PicturedCase, methods: Mapping[str, str]) -> dict[st
 
 def _displacements(case: PicturedCase, methods: Mapping[str, str]) -> dict[str, bytes]:
     """Displacement fields one after the other: the mesh remembers where the breast's voxels lie."""
-    segment = case.ok("segment")
+    segment = case.segment
     files: dict[str, bytes] = {}
     if segment is None:
         return files
-    grid = segment.volume("breast_mask")
+    grid = segment.breast_mask_lps
     for view, method in methods.items():
         # NIfTI keeps the three components in its fifth axis, in its own RAS directions.
         field = displacement_field(case, view, method, grid) * [-1.0, -1.0, 1.0]
@@ -106,7 +104,7 @@ def _carried(case: PicturedCase, view: str, method: str, points: Points) -> Poin
 def _undeformed_mesh(case: PicturedCase, block: BlockMesh) -> bytes:
     """The undeformed mesh, LPS, with the share of gland in each element where a material asked for it."""
     compress = case.ok("compress")
-    gland = kept_gland_share(compress) if compress is not None else None
+    gland = None if compress is None else CompressRecord(compress).gland_share
     shares = {} if gland is None else {GLAND_SHARE: [gland]}
     return vtu_bytes(breast_to_lps(block.points, case.laterality), lps_hexes(block, case.laterality), {}, shares)
 
@@ -116,12 +114,6 @@ def _deformed_mesh(case: PicturedCase, block: BlockMesh, view: str, method: str)
     points = breast_to_lps(block.points, case.laterality)
     carried = _carried(case, view, method, points)
     return vtu_bytes(carried, lps_hexes(block, case.laterality), {"displacement_mm": carried - points}, {})
-
-
-def lps_hexes(block: BlockMesh, laterality: Laterality) -> NDArray[np.int64]:
-    """Connectivity (n^3, 8) whose Jacobians are positive in LPS, where a left breast is mirrored."""
-    hexes = block.hexes()
-    return hexes if laterality == "R" else hexes[:, [1, 0, 3, 2, 5, 4, 7, 6]]
 
 
 def _lesion_names(case: PicturedCase) -> dict[str, bytes]:
@@ -158,15 +150,6 @@ def _lesions_in_mammograms(case: PicturedCase) -> dict[str, bytes]:
             for number, name in enumerate(case.mr_lesions):
                 area = predictions.area(view, method, name)
                 if area is not None:
-                    canonical = area.on_image(int(pose.value("rows")), int(pose.value("columns")))
-                    files[f"lesion_{number}_{method}_{view}.png"] = mask_png(stored_image(pose, canonical))
+                    canonical = area.on_image(pose.geometry.rows, pose.geometry.columns)
+                    files[f"lesion_{number}_{method}_{view}.png"] = mask_png(pose.stored_image(canonical))
     return files
-
-
-def stored_image(pose: Artefact, canonical: NDArray[Any]) -> NDArray[Any]:
-    """A canonical mask turned into the stored one; each stored pixel takes the canonical one under its centre."""
-    columns, rows = np.arange(int(pose.value("stored_columns"))), np.arange(int(pose.value("stored_rows")))
-    from_columns = canonical_pixels(pose, np.stack([columns, np.zeros_like(columns)], axis=1))[:, 0]
-    from_rows = canonical_pixels(pose, np.stack([np.zeros_like(rows), rows], axis=1))[:, 1]
-    index = (np.rint(from_rows).astype(np.intp), np.rint(from_columns).astype(np.intp))
-    return np.asarray(canonical[np.ix_(*(np.clip(i, 0, n - 1) for i, n in zip(index, canonical.shape, strict=True)))])

@@ -4,25 +4,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.plots.detector import DetectorImage
-from stages.engine.artefact import Artefact
+from stages.pose.record import PoseRecord
+from stages.project.record import ProjectRecord
 
 _SHOWN_MM = 0.4
 
 
-def mammogram(pose: Artefact) -> DetectorImage:
+def mammogram(pose: PoseRecord) -> DetectorImage:
     """A view's mammogram, thinned to what a picture resolves; black where the view has none."""
-    pixel_mm, rows, columns = (float(pose.value("pixel_mm")), int(pose.value("rows")), int(pose.value("columns")))
+    pixel_mm, rows, columns = pose.geometry.pixel_mm, pose.geometry.rows, pose.geometry.columns
     step = max(1, round(_SHOWN_MM / pixel_mm))
-    breast = pose.array("breast_mask", "1") != 0 if pose.has("breast_mask") else np.ones((rows, columns), dtype=bool)
-    image = pose.array("mammogram", "1") if pose.has("mammogram") else np.zeros((rows, columns))
+    breast = pose.tissue != 0 if pose.has_mammogram else np.ones((rows, columns), dtype=bool)
+    image = pose.mammogram if pose.has_mammogram else np.zeros((rows, columns))
     return DetectorImage(_block_means(image, step), breast[::step, ::step], pixel_mm, rows, step)
 
 
-def projection(pose: Artefact, projected: Artefact, method: str) -> DetectorImage:
+def projection(pose: PoseRecord, projected: ProjectRecord, method: str) -> DetectorImage:
     """A method's projection of the deformed MR volume."""
-    image, mask = projected.array(f"{method}/projection", "1"), projected.array(f"{method}/mask", "1") != 0
-    pixel_mm, rows = float(pose.value("pixel_mm")), int(pose.value("rows"))
-    return DetectorImage(image, mask, pixel_mm, rows, int(projected.value("step")))
+    image, mask = projected.projection(method), projected.silhouette(method)
+    return DetectorImage(image, mask, pose.geometry.pixel_mm, pose.geometry.rows, projected.step)
 
 
 def _block_means(image: NDArray[np.float64], step: int) -> NDArray[np.float64]:

@@ -6,11 +6,11 @@ from numpy.typing import NDArray
 from mammoreg.plots.detector import pixels_to_mm
 from mammoreg.plots.landmarks import ViewLandmarks, landmarks_in_mammograms, landmarks_in_volume
 from mammoreg.plots.style import Png
-from stages.engine.artefact import Artefact
-from stages.evaluate.predictions import Predictions
+from stages.annotations import mr_landmarks, view_landmarks
 from stages.figures.case import PicturedCase
 from stages.figures.images import mammogram
-from stages.marks import canonical_pixels, mr_landmarks, view_landmarks
+from stages.localize.record import Predictions
+from stages.pose.record import PoseRecord
 
 _SHOWN = ("rigid", "plate", "updated")
 
@@ -26,34 +26,32 @@ def in_mammograms(case: PicturedCase) -> Png | None:
         if truth:
             offered = [method for method in _SHOWN if method in case.methods.get(view, {})]
             predicted = {method: _predicted(predictions, pose, method, list(truth)) for method in offered}
-            true = _mm(pose, canonical_pixels(pose, np.array(list(truth.values()))))
+            true = _mm(pose, pose.canonical_pixels(np.array(list(truth.values()))))
             views.append(ViewLandmarks(view, mammogram(pose), true, predicted))
     return landmarks_in_mammograms(views, case.laterality) if any(v.predicted for v in views) else None
 
 
-def _predicted(predictions: Predictions, pose: Artefact, method: str, names: list[str]) -> NDArray[np.float64]:
-    rows = [predictions.in_mammogram(str(pose.view), method, name) for name in names]
-    pixels = np.array([[np.nan] * 2 if row is None else [row["column"], row["row"]] for row in rows], dtype=float)
-    return _mm(pose, canonical_pixels(pose, pixels))
+def _predicted(predictions: Predictions, pose: PoseRecord, method: str, names: list[str]) -> NDArray[np.float64]:
+    rows = [predictions.in_mammogram(pose.view, method, name) for name in names]
+    pixels = np.array([[np.nan] * 2 if row is None else row.pixel for row in rows], dtype=float)
+    return _mm(pose, pose.canonical_pixels(pixels))
 
 
-def _mm(pose: Artefact, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
-    return pixels_to_mm(pixels, int(pose.value("rows")), float(pose.value("pixel_mm")))
+def _mm(pose: PoseRecord, pixels: NDArray[np.float64]) -> NDArray[np.float64]:
+    return pixels_to_mm(pixels, pose.geometry.rows, pose.geometry.pixel_mm)
 
 
 def in_second_volume(case: PicturedCase) -> Png | None:
     """Landmarks carried into the second MR volume, over the silhouettes of its body."""
-    segment, truth = case.ok("segment"), mr_landmarks(case.inputs, "mr_compressed_landmarks")
-    predictions = case.predictions
-    if segment is None or predictions is None or not truth or "compressed_mask" not in segment.volume_names():
+    segment, truth = case.segment, mr_landmarks(case.inputs, "mr_compressed_landmarks")
+    predictions, mask = case.predictions, segment.compressed_mask_lps if segment else None
+    if mask is None or predictions is None or not truth:
         return None
     predicted = {}
     for method in _SHOWN:
         rows = [predictions.in_compressed(method, name) for name in truth]
         if any(row is not None for row in rows):
-            places = [[np.nan] * 3 if row is None else [row["x"], row["y"], row["z"]] for row in rows]
+            places = [[np.nan] * 3 if row is None else row.point for row in rows]
             predicted[method] = np.array(places, dtype=float)
     true = np.array(list(truth.values()))
-    return (
-        landmarks_in_volume(segment.volume("compressed_mask"), true, predicted, case.laterality) if predicted else None
-    )
+    return landmarks_in_volume(mask, true, predicted, case.laterality) if predicted else None

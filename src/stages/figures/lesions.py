@@ -6,10 +6,10 @@ from mammoreg.geometry import Volume
 from mammoreg.localization.lesions import MaskLesion, MrLesion
 from mammoreg.plots.overview import ViewLesions, VolumeLesions, lesion_overview
 from mammoreg.plots.style import Png
-from stages.evaluate.predictions import Predictions
+from stages.annotations import mr_lesions, view_areas
 from stages.figures.case import BEST_FIRST, PicturedCase, first_of
 from stages.figures.images import mammogram, projection
-from stages.marks import mr_lesions, view_areas
+from stages.localize.record import Predictions
 from stages.methods import METHODS
 
 _SPHERE_STEP_MM = 0.5
@@ -17,7 +17,7 @@ _SPHERE_STEP_MM = 0.5
 
 def overview(case: PicturedCase) -> Png | None:
     """Mammograms, projections and MR slices with true and predicted lesions; None without a mammogram."""
-    segment, predictions = case.ok("segment"), case.predictions
+    segment, predictions = case.segment, case.predictions
     if segment is None or predictions is None or not case.imaged:
         return None
     method = first_of(BEST_FIRST, {name for view in case.imaged for name in case.methods.get(view, {})}) or METHODS[0]
@@ -25,17 +25,15 @@ def overview(case: PicturedCase) -> Png | None:
     found = [predictions.region(method, name) for name in case.mammogram_lesions]
     true, predicted = [lesion_mask(lesion) for lesion in lesions.values()], [region for region in found if region]
     points = [row for name in case.mammogram_lesions if (row := predictions.in_mr(method, name)) is not None]
-    centres = [*(lesion.centre for lesion in lesions.values()), *([row["x"], row["y"], row["z"]] for row in points)]
-    through = np.asarray(centres[0] if centres else segment.array("nipple", "mm"), dtype=float)
+    centres = [*(lesion.centre for lesion in lesions.values()), *(row.point for row in points)]
+    through = np.asarray(centres[0] if centres else segment.nipple_lps, dtype=float)
     views = [_view_lesions(case, predictions, view, method) for view in case.imaged]
-    return lesion_overview(
-        views, VolumeLesions(segment.volume("mr"), through, true, predicted), case.laterality, method
-    )
+    return lesion_overview(views, VolumeLesions(segment.mr_lps, through, true, predicted), case.laterality, method)
 
 
 def _view_lesions(case: PicturedCase, predictions: Predictions, view: str, method: str) -> ViewLesions:
     pose, projected = case.imaged[view], case.projection(view)
-    shown = projection(pose, projected, method) if projected and projected.has(f"{method}/projection") else None
+    shown = projection(pose, projected, method) if projected and projected.shows(method) else None
     found = [predictions.area(view, method, name) for name in case.mr_lesions]
     true = list(view_areas(case.inputs, pose).values())
     return ViewLesions(view, mammogram(pose), shown, true, [area for area in found if area is not None])

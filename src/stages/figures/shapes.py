@@ -10,10 +10,11 @@ from mammoreg.plots.outlines import ViewOutlines, outlines_before_and_after
 from mammoreg.plots.style import Png
 from mammoreg.plots.tissues import segmentation
 from mammoreg.pose.silhouette import detector_mm
-from stages.engine.artefact import Artefact
 from stages.figures.case import BEST_FIRST, PicturedCase, first_of
 from stages.figures.images import mammogram
-from stages.methods import FINE_RAYS, MESH_METHODS, pose_outline
+from stages.methods import MESH_METHODS
+from stages.pose.record import FINE_RAYS
+from stages.segment.record import SegmentRecord
 
 _GLAND = 2
 
@@ -28,7 +29,7 @@ def outlines(case: PicturedCase) -> Png | None:
 def _view_outlines(case: PicturedCase, view: str) -> ViewOutlines:
     assert case.block is not None
     pose = case.poses[view]
-    outline = pose_outline(pose, FINE_RAYS)
+    outline = pose.outline(FINE_RAYS)
     models = {}
     for name, way in case.methods[view].items():
         projected = detector_mm(way.deformation.forward(case.block.points), way.geometry)
@@ -56,20 +57,20 @@ def _between_plates(case: PicturedCase, view: str) -> PlatesPicture | None:
 
 def tissues(case: PicturedCase) -> Png | None:
     """Breast, gland and mesh in slices through the nipple."""
-    segment = case.ok("segment")
+    segment = case.segment
     if segment is None:
         return None
-    breast, labels = segment.volume("breast_mask"), segment.volume("labels")
+    breast, labels = segment.breast_mask_lps, segment.labels_lps
     gland = labels.with_data((labels.data == _GLAND) & (breast.data != 0))
-    nipple = np.asarray(segment.array("nipple", "mm"), dtype=float)
-    return segmentation(segment.volume("mr"), breast, gland, _mesh_mask(case, segment, nipple), nipple, case.laterality)
+    nipple = segment.nipple_lps
+    return segmentation(segment.mr_lps, breast, gland, _mesh_mask(case, segment, nipple), nipple, case.laterality)
 
 
-def _mesh_mask(case: PicturedCase, segment: Artefact, nipple: Points) -> Volume | None:
+def _mesh_mask(case: PicturedCase, segment: SegmentRecord, nipple: Points) -> Volume | None:
     """Voxels inside the mesh, on the two slices through the nipple alone."""
     if case.block is None:
         return None
-    grid = segment.volume("breast_mask")
+    grid = segment.breast_mask_lps
     index = np.clip(np.rint(grid.to_index(nipple)).astype(int), 0, np.array(grid.shape) - 1)
     shown = np.zeros(grid.shape, dtype=bool)
     shown[index[0]] = True

@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from stages.engine.artefact import Fields
+from stages.engine.artefact import Fields, first_failure
 from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.views import IMAGED
 
 if TYPE_CHECKING:
     from mammoreg.plots.style import Png
     from stages.figures.case import PicturedCase
 
-IMAGED = ("CC", "MLO")
 _ARTEFACTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate")
 
 
@@ -39,7 +39,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     files = {f"figures/{picture.name}.png": picture.png.tobytes() for picture in pictures}
     files |= {f"export/{name}": content for name, content in case_exports(case).items()}
     listed = [{"name": p.name, "title": p.title, "caption": p.caption} for p in pictures]
-    failure = next((a.failure for name in _ARTEFACTS for a in inputs.artefacts(name) if a.failure), None)
+    failure = first_failure(artefact for name in _ARTEFACTS for artefact in inputs.artefacts(name))
     return Fields(values={"pictures": listed, "files": sorted(files)}, files=files, failure=failure)
 
 

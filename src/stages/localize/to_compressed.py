@@ -1,7 +1,6 @@
 """Into the compressed MR volume: landmarks carried by each method, placed by that volume's outline alone."""
 
 from collections.abc import Container, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -9,29 +8,27 @@ from mammoreg.geometry import breast_to_lps
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.to_compressed import SecondVolume
 from mammoreg.meshing.block import BlockMesh
-from stages.engine.artefact import Artefact, Fields
+from stages.engine.artefact import Fields
+from stages.localize.record import CompressedRow, compressed_fields
 from stages.localize.views import CaseViews
 from stages.methods import METHODS
+from stages.segment.record import SegmentRecord
+from stages.views import IMAGED, SECOND_VOLUME
 
 _SKIN_PARTS = 2
 
 
-def second_volume(segment: Artefact, block: BlockMesh) -> SecondVolume | None:
+def second_volume(segment: SegmentRecord, block: BlockMesh) -> SecondVolume | None:
     """The second volume of a case, None without one."""
-    if "compressed_mask" not in segment.volume_names():
+    mask = segment.compressed_mask
+    if mask is None:
         return None
-    mask = segment.volume("compressed_mask").to_breast(segment.laterality)
     return SecondVolume(mask, block.skin_points(_SKIN_PARTS))
 
 
 def view_in_second_volume(views: Container[str]) -> str | None:
     """The view whose compression the second volume shows."""
-    return next((view for view in ("3D", "CC", "MLO") if view in views), None)
-
-
-def drawn_mm(pose: Artefact) -> Sequence[float]:
-    """How far (3,) the pose has seen the breast drawn over the plates, plate axes; a mammogram does not tell."""
-    return list(pose.value("drawn_mm")) if pose.view == "3D" else [0.0, 0.0, 0.0]
+    return next((view for view in (SECOND_VOLUME, *IMAGED) if view in views), None)
 
 
 def predict_in_compressed(
@@ -48,17 +45,17 @@ def predict_in_compressed(
         landmarks: points (3,) of the undeformed volume by name, breast frame.
     """
     view = view_in_second_volume(views.methods)
-    rows: list[dict[str, Any]] = []
+    rows: list[CompressedRow] = []
     points = np.array(list(landmarks.values())).reshape(-1, 3)
     if not landmarks:
-        return Fields(values={"compressed_rows": rows})
+        return compressed_fields(rows)
     for method in METHODS:
         carried = _carried(views, view, second, method, points)
         if carried is None:
             rows += missing_in_compressed(list(landmarks), _trouble(views, view, method), (method,))
         else:
             rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality))
-    return Fields(values={"compressed_rows": rows})
+    return compressed_fields(rows)
 
 
 def _carried(views: CaseViews, view: str | None, second: SecondVolume, method: str, points: Points) -> Points | None:
@@ -69,7 +66,7 @@ def _carried(views: CaseViews, view: str | None, second: SecondVolume, method: s
         return second.rigid(points)
     if method not in views.methods[view]:
         return None
-    return second.place(views.methods[view][method], drawn_mm(views.poses[view]), points)
+    return second.place(views.methods[view][method], views.poses[view].drawn_mm, points)
 
 
 def _trouble(views: CaseViews, view: str | None, method: str) -> str:
@@ -77,14 +74,10 @@ def _trouble(views: CaseViews, view: str | None, method: str) -> str:
     return views.troubles.get((str(lost), method), "no view shows the compression")
 
 
-def missing_in_compressed(names: Sequence[str], message: str, methods: Sequence[str] = METHODS) -> list[dict[str, Any]]:
+def missing_in_compressed(names: Sequence[str], message: str, methods: Sequence[str] = METHODS) -> list[CompressedRow]:
     """Rows without numbers of landmarks by name."""
-    numbers: dict[str, Any] = dict.fromkeys("xyz")
-    return [{"method": method, "name": name, **numbers, "message": message} for method in methods for name in names]
+    return [CompressedRow(method, name, message=message) for method in methods for name in names]
 
 
-def _rows(method: str, names: list[str], points: Points) -> list[dict[str, Any]]:
-    return [
-        {"method": method, "name": name, **dict(zip("xyz", map(float, point), strict=True)), "message": ""}
-        for name, point in zip(names, points, strict=True)
-    ]
+def _rows(method: str, names: list[str], points: Points) -> list[CompressedRow]:
+    return [CompressedRow(method, name, *point.tolist()) for name, point in zip(names, points, strict=True)]

@@ -1,7 +1,6 @@
 """MR to mammogram: where each mammogram shows what is marked in the MR volume."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +9,12 @@ from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import MethodView
 from mammoreg.localization.lesions import LesionBody
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
-from stages.engine.artefact import Artefact, Fields
+from stages.engine.artefact import Fields
+from stages.localize.record import AreaPrediction, MammogramRow, mammogram_fields
 from stages.localize.views import CaseViews
-from stages.marks import area_field, stored_pixels
 from stages.methods import METHODS
+from stages.pose.record import PoseRecord
 
-Rows = list[dict[str, Any]]
 UNSEEN = "outside the imaged part"
 
 
@@ -29,52 +28,42 @@ def predict_in_mammograms(
         bodies: lesions of the MR volume by name, breast frame.
         landmarks: points (3,) of the MR volume by name, breast frame.
     """
-    rows: Rows = []
-    arrays, places = {}, {}
+    rows: list[MammogramRow] = []
+    areas: list[AreaPrediction] = []
     for view in views.imaged:
         for method in METHODS:
             if (view, method) in views.troubles:
                 rows += _missing(view, method, [*bodies, *landmarks], views.troubles[view, method])
                 continue
             pose, way = views.poses[view], views.methods[view][method]
-            for number, (name, body) in enumerate(bodies.items()):
+            for name, body in bodies.items():
                 lesion = project_lesion(way, body)
                 rows.append(_row(pose, method, name, lesion.centre, lesion.seen))
                 if lesion.area is not None:
-                    key = area_key(view, method, number)
-                    arrays[key], places[key] = area_field(lesion.area, f"{name}, predicted by {method}")
+                    areas.append(AreaPrediction(view, method, name, lesion.area))
             rows += _landmark_rows(pose, method, way, landmarks)
-    values: dict[str, Any] = {"mammogram_rows": rows, "mammogram_area_places": places, "mr_lesion_names": list(bodies)}
-    return Fields(arrays=arrays, values=values)
+    return mammogram_fields(rows, areas, list(bodies))
 
 
-def missing_in_mammograms(views: CaseViews, names: list[str]) -> Rows:
+def missing_in_mammograms(views: CaseViews, names: list[str]) -> list[MammogramRow]:
     """Rows without numbers of lesions and landmarks by name, in views none of whose methods has a result."""
     pairs = [(view, method) for view in views.imaged for method in METHODS]
     return [row for pair in pairs for row in _missing(*pair, names, views.troubles[pair])]
 
 
-def area_key(view: str, method: str, number: int) -> str:
-    """Name of the array of a projected lesion, numbered as in `mr_lesion_names`."""
-    return f"mammogram/{view}/{method}/lesion{number}"
+def _missing(view: str, method: str, names: list[str], message: str) -> list[MammogramRow]:
+    return [MammogramRow(view, method, name, message=message) for name in names]
 
 
-def _landmark_rows(pose: Artefact, method: str, way: MethodView, landmarks: Mapping[str, Points]) -> Rows:
+def _landmark_rows(
+    pose: PoseRecord, method: str, way: MethodView, landmarks: Mapping[str, Points]
+) -> list[MammogramRow]:
     pixels, seen = project_landmarks(way, np.array(list(landmarks.values())).reshape(-1, 3))
     return [_row(pose, method, n, p, bool(s)) for n, p, s in zip(landmarks, pixels, seen, strict=True)]
 
 
-def _row(pose: Artefact, method: str, name: str, pixel: NDArray[np.float64], seen: bool) -> dict[str, Any]:
-    column, row = stored_pixels(pose, pixel) if seen else (None, None)
-    return _line(str(pose.view), method, name, column, row, seen, "" if seen else UNSEEN)
-
-
-def _missing(view: str, method: str, names: list[str], message: str) -> Rows:
-    return [_line(view, method, name, None, None, False, message) for name in names]
-
-
-def _line(
-    view: str, method: str, name: str, column: float | None, row: float | None, seen: bool, message: str
-) -> dict[str, Any]:
-    place = {"column": column, "row": row, "radius_mm": None, "seen": seen, "message": message}
-    return {"view": view, "method": method, "name": name} | place
+def _row(pose: PoseRecord, method: str, name: str, pixel: NDArray[np.float64], seen: bool) -> MammogramRow:
+    if not seen:
+        return MammogramRow(pose.view, method, name, message=UNSEEN)
+    column, row = map(float, pose.stored_pixels(pixel))
+    return MammogramRow(pose.view, method, name, column, row, seen=True)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,11 +11,10 @@ from mammoreg.localization.anatomy import clock_position, distance_to
 from mammoreg.localization.grid import BreastGrid, BreastInView
 from mammoreg.localization.lesions import LesionArea
 from mammoreg.localization.to_mr import MrPrediction, locate_in_breast
-from stages.engine.artefact import Array, Fields, VolumeField
+from stages.engine.artefact import Fields
+from stages.localize.record import MrRow, RegionPrediction, mr_fields
 from stages.localize.views import CaseViews
 from stages.methods import METHODS
-
-_WIDEST_GAP_MM = 10.0
 
 
 @dataclass(frozen=True)
@@ -47,71 +45,55 @@ def predict_in_mr(
         names_of: lesions that each view marks, views whose pose failed too.
         areas: lesions by view and name, canonical pixels, of the other views.
     """
-    rows: list[dict[str, Any]] = []
-    arrays: dict[str, Array] = {}
-    volumes: dict[str, VolumeField] = {}
+    rows: list[MrRow] = []
+    regions: list[RegionPrediction] = []
     grid = BreastGrid(anatomy.breast)
     names = list(dict.fromkeys(name for marked in names_of.values() for name in marked))
     for method in METHODS if names else ():
         offered = {view: m[method] for view, m in views.methods.items() if view in areas and method in m}
         seen = {view: BreastInView(way, grid) for view, way in offered.items()}
-        for number, name in enumerate(names):
+        for name in names:
             shown = [view for view in names_of if name in names_of[view]]
             usable = {view: areas[view][name] for view in shown if view in seen}
             lost = list(dict.fromkeys(views.troubles.get((v, method), "") for v in shown if v not in seen))
             if not usable:
-                rows.append(_line(method, name, "+".join(shown), "; ".join(lost)))
+                rows.append(MrRow("+".join(shown), method, name, message="; ".join(lost)))
                 continue
             found = locate_in_breast(seen, usable)
             rows.append(_row(method, name, found, anatomy, lost))
-            key = mr_key(method, number)
-            arrays |= _curves(key, found, anatomy.laterality)
-            volumes |= _region(key, found, anatomy.laterality)
-    return Fields(arrays=arrays, volumes=volumes, values={"mr_rows": rows, "mammogram_lesion_names": names})
+            regions.append(_region(method, name, found, anatomy.laterality))
+    return mr_fields(rows, regions, names)
 
 
-def missing_in_mr(names_of: Mapping[str, list[str]], message: str) -> list[dict[str, Any]]:
+def missing_in_mr(names_of: Mapping[str, list[str]], message: str) -> list[MrRow]:
     """Rows without numbers of the lesions that views mark, given by view."""
     names = dict.fromkeys(name for marked in names_of.values() for name in marked)
     shown = {name: "+".join(view for view in names_of if name in names_of[view]) for name in names}
-    return [_line(method, name, shown[name], message) for method in METHODS for name in names]
+    return [MrRow(shown[name], method, name, message=message) for method in METHODS for name in names]
 
 
-def mr_key(method: str, number: int) -> str:
-    """Group of a lesion's region and curves, numbered as in `mammogram_lesion_names`."""
-    return f"mr/{method}/lesion{number}"
-
-
-def _row(method: str, name: str, found: MrPrediction, anatomy: Anatomy, lost: list[str]) -> dict[str, Any]:
+def _row(method: str, name: str, found: MrPrediction, anatomy: Anatomy, lost: list[str]) -> MrRow:
     point = found.point
-    message = "; ".join(text for text in (found.message, *lost) if text)
-    row = _line(method, name, "+".join(found.curves), message)
-    row |= dict(zip("xyz", breast_to_lps(point, anatomy.laterality).tolist(), strict=True))
-    return row | {
-        "beam_gap_mm": found.beam_gap_mm,
-        "nipple_distance_mm": float(np.linalg.norm(point - anatomy.nipple)),
-        "clock": clock_position(point, anatomy.nipple, anatomy.laterality),
-        "skin_depth_mm": distance_to(point, anatomy.skin),
-        "chest_wall_depth_mm": distance_to(point, anatomy.chest_wall),
-    }
+    x, y, z = breast_to_lps(point, anatomy.laterality).tolist()
+    return MrRow(
+        "+".join(found.curves),
+        method,
+        name,
+        x=x,
+        y=y,
+        z=z,
+        beam_gap_mm=found.beam_gap_mm,
+        nipple_distance_mm=float(np.linalg.norm(point - anatomy.nipple)),
+        clock=clock_position(point, anatomy.nipple, anatomy.laterality),
+        skin_depth_mm=distance_to(point, anatomy.skin),
+        chest_wall_depth_mm=distance_to(point, anatomy.chest_wall),
+        message="; ".join(text for text in (found.message, *lost) if text),
+    )
 
 
-def _line(method: str, name: str, views: str, message: str) -> dict[str, Any]:
-    numbers = ("x", "y", "z", "radius_mm", "beam_gap_mm", "nipple_distance_mm")
-    depths = ("skin_depth_mm", "chest_wall_depth_mm")
-    row: dict[str, Any] = {"views": views, "method": method, "name": name}
-    return row | dict.fromkeys(numbers) | {"clock": ""} | dict.fromkeys(depths) | {"message": message}
-
-
-def _curves(key: str, found: MrPrediction, laterality: Laterality) -> dict[str, Array]:
-    return {
-        f"{key}/curve_{view}": Array(breast_to_lps(curve, laterality), "mm", f"beam of {view} in the undeformed breast")
-        for view, curve in found.curves.items()
-    }
-
-
-def _region(key: str, found: MrPrediction, laterality: Laterality) -> dict[str, VolumeField]:
-    if found.region is None:
-        return {}
-    region = found.region.with_data(found.region.data.astype(np.uint8)).to_lps(laterality)
-    return {f"{key}/region": VolumeField(region, "1", "predicted lesion in the undeformed breast")}
+def _region(method: str, name: str, found: MrPrediction, laterality: Laterality) -> RegionPrediction:
+    curves = {view: breast_to_lps(curve, laterality) for view, curve in found.curves.items()}
+    region = found.region
+    if region is not None:
+        region = region.with_data(region.data.astype(np.uint8)).to_lps(laterality)
+    return RegionPrediction(method, name, curves, region)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from mammoreg.localization.deformation import MethodView, ReferenceMesh
 from stages.engine.artefact import Artefact
 from stages.methods import MESH_METHODS, METHODS, method_views
-
-IMAGED = ("CC", "MLO")
+from stages.pose.record import PoseRecord
+from stages.views import IMAGED
 
 
 @dataclass(frozen=True)
@@ -15,12 +15,12 @@ class CaseViews:
     """What `localize` works with, by view name, CC first.
 
     Attributes:
-        poses: artefacts of `pose` that ended well.
+        poses: of those that ended well.
         methods: what each view of `poses` offers, by method.
         troubles: (view, method) -> why it is missing.
     """
 
-    poses: Mapping[str, Artefact]
+    poses: Mapping[str, PoseRecord]
     methods: Mapping[str, Mapping[str, MethodView]]
     troubles: Mapping[tuple[str, str], str]
 
@@ -39,7 +39,7 @@ def case_views(poses: Sequence[Artefact], solutions: Sequence[Artefact], referen
         reference: the undeformed mesh.
     """
     ordered = sorted(poses, key=lambda pose: str(pose.view))
-    well = {str(pose.view): pose for pose in ordered if pose.ok}
+    well = {str(pose.view): PoseRecord(pose) for pose in ordered if pose.ok}
     methods = {view: method_views(pose, reference, solutions) for view, pose in well.items()}
     troubles = {(str(pose.view), method): pose.message for pose in ordered if not pose.ok for method in METHODS}
     for view, offered in methods.items():

@@ -3,13 +3,11 @@
 import numpy as np
 from pydantic import Field
 
-from mammoreg.geometry import breast_to_lps, lps_to_breast
 from mammoreg.meshing.breast import BreastMesh, build_mesh
 from mammoreg.meshing.quality import MeshQuality
-from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-
-# In a left breast LPS mirrors the block: swapping the ends of its first axis makes the elements right-handed again.
-_MIRRORED_ORDER = [1, 0, 3, 2, 5, 4, 7, 6]
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.mesh.record import mesh_fields
+from stages.segment.record import SegmentRecord
 
 
 class Settings(SettingsModel):
@@ -23,23 +21,14 @@ class Settings(SettingsModel):
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Mesh the segmented breast."""
-    side = subject.laterality
-    segment = inputs.artefact("segment")
-    mask = segment.volume("breast_mask").to_breast(side)
-    back, nipple = (lps_to_breast(segment.array(name, "mm"), side) for name in ("chest_wall_surface", "nipple"))
-    built = build_mesh(mask, back, nipple, settings.elements)
-    hexes = built.mesh.hexes()
-    arrays = {
-        "points": Array(breast_to_lps(built.mesh.points, side), "mm", "nodes of the block, first axis to medial"),
-        "hexes": Array(hexes[:, _MIRRORED_ORDER] if side == "L" else hexes, "1", "nodes of each hexahedron, VTK order"),
-    }
-    return Fields(arrays=arrays, values=_values(built, settings))
+    segment = SegmentRecord(inputs.artefact("segment"))
+    built = build_mesh(segment.breast_mask, segment.chest_wall, segment.nipple, settings.elements)
+    return mesh_fields(built.mesh, subject.laterality, _values(built, settings))
 
 
 def _values(built: BreastMesh, settings: Settings) -> dict[str, Value]:
     quality = built.quality
     return {
-        "n": built.mesh.n,
         "min_gauss_jacobian": quality.min_gauss_jacobian,
         "min_corner_jacobian": quality.min_corner_jacobian,
         "volume_error": quality.volume_error,

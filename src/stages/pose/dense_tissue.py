@@ -6,15 +6,15 @@ from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.locate import Locator
 from mammoreg.pose.estimate import DenseTissue
-from stages.engine.artefact import Artefact
+from stages.segment.record import SegmentRecord
 
 GLAND = 2
 BLOCK_MM = 2.8  # a tissue point stands for a block of about this side; wider gaps show between the plates
 
 
-def coarse_tissue(segment: Artefact, mesh: BlockMesh) -> DenseTissue:
+def coarse_tissue(segment: SegmentRecord, mesh: BlockMesh) -> DenseTissue:
     """Share of gland in blocks of breast voxels."""
-    labels, breast = (segment.volume(name).to_breast(segment.laterality) for name in ("labels", "breast_mask"))
+    labels, breast = segment.labels, segment.breast_mask
     gland, inside = (_blocks(v) for v in (labels.with_data(labels.data == GLAND), breast.with_data(breast.data > 0)))
     kept = inside.data > 0.5
     element, local, _ = Locator(mesh.points, mesh.hexes()).locate(inside.centres(kept))

@@ -4,19 +4,22 @@ import numpy as np
 from pydantic import Field
 
 from mammoreg.errors import NotConvergedError
-from mammoreg.geometry import ViewGeometry, lps_to_breast
+from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.estimate import PoseEstimate, estimate_pose
-from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.calibrate.record import CalibrateRecord
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.mechanics import Mechanics
-from stages.methods import block_mesh
-from stages.pose.affine import affine_arrays, rigid_values
+from stages.mesh.record import MeshRecord
+from stages.pose.affine import affine_maps, rigid_geometry
 from stages.pose.coarse import coarse_compression
 from stages.pose.dense_tissue import coarse_tissue
+from stages.pose.record import PoseFields
 from stages.pose.start import start_view, without_image
-from stages.pose.view_facts import Seen, see_mammogram, see_second_volume
+from stages.pose.view_facts import ViewFacts, facts_of_mammogram, facts_of_second_volume
+from stages.segment.record import SegmentRecord
 
 ANGLE_AT_BOUND = "angle at its bound"
 ANGLE_FROM_HEADER = "angle not determined by the image"
@@ -39,37 +42,35 @@ class Settings(SettingsModel):
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Estimate the pose of one view."""
-    segment, mesh = inputs.artefact("segment"), block_mesh(inputs.artefact("mesh"))
-    image = inputs.path("image")
+    segment, mesh = SegmentRecord(inputs.artefact("segment")), MeshRecord(inputs.artefact("mesh")).block
+    image, second = inputs.path("image"), segment.compressed_mask
     if image is not None:
-        seen = see_mammogram(image, subject, "MLO" if subject.view == "MLO" else "CC")
-    elif segment.has("compressed_mask"):
-        seen = see_second_volume(segment.volume("compressed_mask").to_breast(subject.laterality))
+        facts = facts_of_mammogram(image, subject, "MLO" if subject.view == "MLO" else "CC")
+    elif second is not None:
+        facts = facts_of_second_volume(second)
     else:
         return without_image(mesh, subject)
-    nipple = lps_to_breast(segment.array("nipple", "mm"), subject.laterality)
-    mu_kpa = float(inputs.artefact("calibrate").value("mu_kpa"))
-    compress = coarse_compression(mesh, settings.mechanics.numerics(), mu_kpa, plates_known=seen.placed)
-    start, estimated, doubts = start_view(seen, mesh, compress)
-    tissue = coarse_tissue(segment, mesh) if settings.use_density and not seen.placed else None
+    mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
+    compress = coarse_compression(mesh, settings.mechanics.numerics(), mu_kpa, plates_known=facts.placed)
+    start, estimated, doubts = start_view(facts, mesh, compress)
+    tissue = coarse_tissue(segment, mesh) if settings.use_density and not facts.placed else None
     found = estimate_pose(
         start,
-        seen.outline,
+        facts.outline,
         compress,
         skin_facets(mesh.skin_quads(), len(mesh.points), 2),
-        0.0 if seen.placed else settings.angle_step_deg,
+        0.0 if facts.placed else settings.angle_step_deg,
         settings.angle_bound_deg,
         settings.angle_sd_deg,
         tissue,
-        seen.density,
+        facts.density,
     )
-    if found is None and seen.placed:
-        known: dict[str, Value] = {"angle_determined": True, "angle_sd_deg": None, "drawn_mm": [0.0, 0.0, 0.0]}
-        return _fields(seen, mesh, nipple, start, start, known, estimated, (NOT_DRAWN,))
+    if found is None and facts.placed:
+        return _fields(facts, mesh, segment.nipple, start, None, estimated, (NOT_DRAWN,))
     if found is None:
         raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
-    flags = () if seen.placed else (*doubts, *_angle_flags(found))
-    return _fields(seen, mesh, nipple, start, found.view, _search_values(found, seen), estimated, flags)
+    flags = () if facts.placed else (*doubts, *_angle_flags(found))
+    return _fields(facts, mesh, segment.nipple, start, found, estimated, flags)
 
 
 def _angle_flags(found: PoseEstimate) -> tuple[str, ...]:
@@ -77,12 +78,47 @@ def _angle_flags(found: PoseEstimate) -> tuple[str, ...]:
     return tuple(text for text, holds in doubts if holds)
 
 
-def _search_values(found: PoseEstimate, seen: Seen) -> dict[str, Value]:
-    drawn = [seen.geometry.middle_mm - found.view.middle_mm, seen.geometry.edge_p_mm - found.view.edge_p_mm, 0.0]
+def _fields(
+    facts: ViewFacts,
+    mesh: BlockMesh,
+    nipple: Points,
+    start: ViewGeometry,
+    found: PoseEstimate | None,
+    estimated: tuple[str, ...],
+    flags: tuple[str, ...],
+) -> Fields:
+    """What the artefact keeps; without an estimate the view stays where it started."""
+    view = start if found is None else found.view
+    return PoseFields(
+        view=view,
+        rigid=rigid_geometry(mesh, start, facts, nipple),
+        maps=affine_maps(mesh, start, view, facts),
+        outline=facts.image,
+        mammogram=facts.mammogram,
+        tissue=facts.tissue,
+        storage=facts.storage,
+        plates_known=facts.placed,
+        drawn_mm=_drawn_mm(facts, view),
+        estimated=estimated,
+        flags=(*facts.flags, *flags),
+        values={
+            **facts.values,
+            "header_angle_deg": facts.geometry.angle_deg,
+            "angle_determined": facts.placed or (found is not None and found.determined),
+            **({} if found is None else _search_values(found)),
+        },
+    ).fields()
+
+
+def _drawn_mm(facts: ViewFacts, view: ViewGeometry) -> tuple[float, ...] | None:
+    """How far the breast was drawn over the plates: from the model's to the second volume's place, plate axes."""
+    if not facts.placed:
+        return None
+    return facts.geometry.middle_mm - view.middle_mm, facts.geometry.edge_p_mm - view.edge_p_mm, 0.0
+
+
+def _search_values(found: PoseEstimate) -> dict[str, Value]:
     return {
-        "angle_determined": found.determined or seen.placed,
-        # How far the breast was drawn over the plates: from the model's to the second volume's place, plate axes.
-        "drawn_mm": drawn if seen.placed else None,
         "angle_sd_deg": found.angle_sd_deg if np.isfinite(found.angle_sd_deg) else None,
         "coarse_rms_mm": found.alignment.rms_mm,
         "tried": [
@@ -98,39 +134,6 @@ def _search_values(found: PoseEstimate, seen: Seen) -> dict[str, Value]:
             for c in found.candidates
         ],
     }
-
-
-def _fields(
-    seen: Seen,
-    mesh: BlockMesh,
-    nipple: Points,
-    start: ViewGeometry,
-    view: ViewGeometry,
-    search: dict[str, Value],
-    estimated: tuple[str, ...],
-    flags: tuple[str, ...],
-) -> Fields:
-    arrays: dict[str, Array] = {**seen.arrays, **affine_arrays(mesh, start, view, seen)}
-    values: dict[str, Value] = {
-        **seen.values,
-        "plates_known": seen.placed,
-        "angle_deg": view.angle_deg,
-        "header_angle_deg": seen.geometry.angle_deg,
-        "edge_p_mm": view.edge_p_mm,
-        "middle_mm": view.middle_mm,
-        "height_mm": view.height_mm,
-        "thickness_mm": view.thickness_mm,
-        "source_detector_mm": view.source_detector_mm,
-        "support_detector_mm": view.support_detector_mm,
-        "pixel_mm": view.pixel_mm,
-        "rows": view.rows,
-        "columns": view.columns,
-        **rigid_values(mesh, start, seen, nipple),
-        **search,
-        "estimated": list(estimated),
-        "flags": [*seen.flags, *flags],
-    }
-    return Fields(arrays=arrays, values=values)
 
 
 STAGE = Stage(

@@ -8,41 +8,44 @@ import numpy as np
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.geometry.frames import Points, plate_rotation
+from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.estimate import Compressed
 from mammoreg.pose.scaling import fit_scaling
 from mammoreg.pose.thickness import estimate_thickness
-from stages.engine.contract import Array, Fields, Subject
-from stages.pose.view_facts import Seen
+from stages.engine.contract import Fields, Subject, Value
+from stages.pose.record import PoseFields
+from stages.pose.view_facts import ViewFacts
 
 THICKNESS_AT_BOUND = "estimated thickness at the bound of its search"
+FAR_SOURCE_MM = 1.0e7  # whose beams are parallel
 EDGE_QUANTILE = 0.25  # a plate's edge reaches in front of most, not all, of the breast's back
 
 
 def start_view(
-    seen: Seen, mesh: BlockMesh, compress: Callable[[ViewGeometry], Compressed | None]
+    facts: ViewFacts, mesh: BlockMesh, compress: Callable[[ViewGeometry], Compressed | None]
 ) -> tuple[ViewGeometry, tuple[str, ...], tuple[str, ...]]:
     """Geometry from the volume-preserving scaling at the header's angle, the names of what was estimated, and doubts.
 
     Raises:
         DataError: the mammogram's thickness is no compression of this breast, or cannot be estimated.
     """
-    if seen.placed:
-        return seen.geometry, seen.estimated, ()
-    turned = breast_to_plate(mesh.points, seen.geometry.angle_deg)
+    if facts.placed:
+        return facts.geometry, facts.estimated, ()
+    turned = breast_to_plate(mesh.points, facts.geometry.angle_deg)
     view = replace(
-        seen.geometry,
+        facts.geometry,
         edge_p_mm=float(np.quantile(turned[mesh.back_nodes(), 1], EDGE_QUANTILE)),
         middle_mm=float(turned[:, 0].mean()),
     )
-    estimated = seen.estimated
+    estimated = facts.estimated
     doubts: tuple[str, ...] = ()
     front = turned[turned[:, 1] < view.edge_p_mm, 2]
     height = float(np.ptp(front if len(front) else turned[:, 2]))
     if not np.isfinite(view.thickness_mm):
         facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
-        found = estimate_thickness(view, seen.outline, compress, facets, height)
+        found = estimate_thickness(view, facts.outline, compress, facets, height)
         if found is None:
             raise DataError("the compressed thickness is unknown and cannot be estimated; give thickness_mm")
         view = replace(view, thickness_mm=found.thickness_mm)
@@ -53,7 +56,7 @@ def start_view(
             f"the compressed thickness of {view.thickness_mm:.1f} mm is not below the uncompressed breast's "
             f"{height:.1f} mm; correct thickness_mm in the views table (or the header), or check the MR volume's side"
         )
-    fitted = fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, seen.outline).alignment.view
+    fitted = fit_scaling(mesh.points, mesh.skin_quads().astype(np.intp), view, facts.outline).alignment.view
     _refuse_runaway(turned, fitted, height)
     return fitted, estimated, doubts
 
@@ -91,35 +94,25 @@ def without_image(mesh: BlockMesh, subject: Subject) -> Fields:
     front = mesh.points[mesh.points[:, 1] < edge]
     low, high = float(front[:, 2].min()), float(front[:, 2].max())
     thickness = (1.0 - share) * (high - low)
-    placed = {
-        "angle_deg": 0.0,
-        "edge_p_mm": edge,
-        "middle_mm": float(mesh.points[:, 0].mean()),
-        "height_mm": 0.5 * (low + high) - 0.5 * thickness,
-        "thickness_mm": thickness,
-    }
-    ratio = 1.0 - share
-    scale = np.array([ratio**-0.5, ratio**-0.5, ratio])
-    anchor = np.array([placed["middle_mm"], float(back[:, 1].max()), 0.5 * (low + high)])
-    return Fields(
-        arrays={
-            "rigid_matrix": Array(plate_rotation(0.0), "1", "method rigid, breast to plate frame"),
-            "rigid_offset": Array(np.zeros(3), "mm", "method rigid, breast to plate frame"),
-            "scaling_matrix": Array(np.diag(scale), "1", "method scaling, breast to plate frame"),
-            "scaling_offset": Array(anchor - scale * anchor, "mm", "method scaling, breast to plate frame"),
-        },
-        values={
-            **placed,
-            **{f"rigid_{name}": value for name, value in placed.items()},
-            "source_detector_mm": 1.0e7,
-            "support_detector_mm": 0.0,
-            "pixel_mm": 1.0,
-            "rows": 400,
-            "columns": 300,
-            "plates_known": False,
-            "drawn_mm": [0.0, 0.0, 0.0],
-            "angle_determined": False,
-            "estimated": ["angle_deg", "edge_p_mm", "thickness_mm"],
-            "flags": [],
-        },
+    ratio, middle = 1.0 - share, 0.5 * (low + high)
+    view = ViewGeometry(
+        angle_deg=0.0,
+        edge_p_mm=edge,
+        middle_mm=float(mesh.points[:, 0].mean()),
+        height_mm=middle - 0.5 * thickness,
+        thickness_mm=thickness,
+        source_detector_mm=FAR_SOURCE_MM,
+        support_detector_mm=0.0,
+        pixel_mm=1.0,
+        rows=400,
+        columns=300,
     )
+    scale = np.array([ratio**-0.5, ratio**-0.5, ratio])
+    anchor = np.array([view.middle_mm, float(back[:, 1].max()), middle])
+    maps = {
+        "rigid": AffineDeformation(plate_rotation(0.0), np.zeros(3)),
+        "scaling": AffineDeformation(np.diag(scale), anchor - scale * anchor),
+    }
+    estimated = ("angle_deg", "edge_p_mm", "thickness_mm")
+    known: dict[str, Value] = {"angle_determined": False}
+    return PoseFields(view, view, maps, drawn_mm=(0.0, 0.0, 0.0), estimated=estimated, values=known).fields()

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.imaging.mammogram import MammogramAnalysis, analyse
-from mammoreg.imaging.mammogram_canonical import CanonicalMammogram, canonicalise
+from mammoreg.imaging.mammogram_canonical import canonicalise
 from mammoreg.imaging.mammogram_orientation import View
 from mammoreg.pose.density import DensityImage, mammogram_structure
 from mammoreg.pose.outline import RadialOutline, radial_outline
@@ -17,14 +18,12 @@ from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
 from mammoreg.pose.silhouette import pixels_at_detector, ray_angles
 from stages.cohort.readers.mammogram import read_mammogram
-from stages.engine.contract import Array, Subject, Value
-from stages.methods import OUTLINE_RAYS
-
-TISSUE_CODES = "0 air, 1 breast, 2 pectoral muscle"
+from stages.engine.contract import Subject, Value
+from stages.pose.record import OUTLINE_RAYS, ImageOutline, ImageStorage
 
 
 @dataclass(frozen=True)
-class Seen:
+class ViewFacts:
     """A view before its pose is known.
 
     Attributes:
@@ -35,21 +34,27 @@ class Seen:
         nipple: (2,) canonical (column, row), or None.
         estimated: what neither header nor table gave.
         flags: doubts.
-        arrays, values: what the artefact takes over.
+        image: the outline as the image shows it.
+        mammogram, tissue: canonical image and its labels; None without one.
+        storage: of the mammogram.
+        values: what the artefact takes over besides.
     """
 
     geometry: ViewGeometry
     outline: RadialOutline
+    image: ImageOutline
     placed: bool
     density: DensityImage | None = None
     nipple: NDArray[np.float64] | None = None
     estimated: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
-    arrays: dict[str, Array] = field(default_factory=dict)
+    mammogram: NDArray[Any] | None = None
+    tissue: NDArray[np.uint8] | None = None
+    storage: ImageStorage | None = None
     values: dict[str, Value] = field(default_factory=dict)
 
 
-def see_mammogram(path: Path, subject: Subject, view: View) -> Seen:
+def facts_of_mammogram(path: Path, subject: Subject, view: View) -> ViewFacts:
     """Read and analyse a mammogram.
 
     Raises:
@@ -83,22 +88,21 @@ def see_mammogram(path: Path, subject: Subject, view: View) -> Seen:
         columns=columns,
     )
     breast = found.mask if found.pectoral is None else found.mask & ~found.pectoral
-    return Seen(
+    return ViewFacts(
         geometry=geometry,
         outline=radial_outline(
             pixels_at_detector(found.outline, geometry), found.outline_weight, ray_angles(OUTLINE_RAYS)
         ),
+        image=ImageOutline(found.outline, found.outline_weight),
         placed=False,
         density=mammogram_structure(image.pixels, breast, facts.pixel_mm),
         nipple=found.nipple,
         estimated=tuple(dict.fromkeys((*facts.estimated, *image.estimated))),
         flags=(*facts.flags, *image.flags),
-        arrays=_image_arrays(image, found),
+        mammogram=image.pixels,
+        tissue=_tissue(found),
+        storage=ImageStorage(rows, columns, bool(image.flips.rows), bool(image.flips.columns)),
         values={
-            "flip_rows": bool(image.flips.rows),
-            "flip_columns": bool(image.flips.columns),
-            "stored_rows": rows,
-            "stored_columns": columns,
             "chest_wall_side": image.flips.chest_wall_side,
             "nipple_px": None if found.nipple is None else [float(x) for x in found.nipple],
             "header_force_n": facts.force_n,
@@ -106,7 +110,7 @@ def see_mammogram(path: Path, subject: Subject, view: View) -> Seen:
     )
 
 
-def see_second_volume(mask: Volume) -> Seen:
+def facts_of_second_volume(mask: Volume) -> ViewFacts:
     """Plates and silhouette of a second MR volume's body mask (breast frame)."""
     plates = find_plates(mask)
     geometry = parallel_view(mask, plates)
@@ -116,21 +120,15 @@ def see_second_volume(mask: Volume) -> Seen:
     pixels = np.stack(
         [points[:, 0] / geometry.pixel_mm - 0.5, points[:, 1] / geometry.pixel_mm + 0.5 * (geometry.rows - 1)], axis=-1
     )
-    arrays = {
-        "outline": Array(pixels[known], "px", "outline of the second volume along the compression, (column, row)"),
-        "outline_weight": Array(outline.weight[known], "1", "trust in the outline"),
-    }
+    meaning = "outline of the second volume along the compression, (column, row)"
+    image = ImageOutline(pixels[known], outline.weight[known], meaning)
     values: dict[str, Value] = {"contact_mm2": list(plates.contact_mm2)}
-    return Seen(geometry, outline, placed=True, arrays=arrays, values=values)
+    return ViewFacts(geometry, outline, image, placed=True, values=values)
 
 
-def _image_arrays(image: CanonicalMammogram, found: MammogramAnalysis) -> dict[str, Array]:
+def _tissue(found: MammogramAnalysis) -> NDArray[np.uint8]:
+    """Labels of the canonical image: 0 air, 1 breast, 2 pectoral muscle."""
     tissue = found.mask.astype(np.uint8)
     if found.pectoral is not None:
         tissue[found.pectoral & found.mask] = 2
-    return {
-        "mammogram": Array(image.pixels, "1", "canonical mammogram, bright is dense"),
-        "breast_mask": Array(tissue, "1", f"canonical image: {TISSUE_CODES}"),
-        "outline": Array(found.outline, "px", "outline between skin and air, canonical (column, row)"),
-        "outline_weight": Array(found.outline_weight, "1", "1 where the outline is skin, fading to 0 elsewhere"),
-    }
+    return tissue

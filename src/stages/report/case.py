@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from mammoreg.metrics.summary import summarise
-from stages.cohort.cases import PLAIN_VIEW
 from stages.engine.artefact import Artefact
 from stages.engine.completion import first_failures
 from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
 from stages.tables.layout import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
+from stages.views import SECOND_VOLUME
 
 SHOWN_METHOD = "updated"
 SIDES = {"L": "left", "R": "right"}
@@ -89,7 +89,7 @@ def _headline(artefacts: Sequence[Artefact]) -> list[tuple[str, str]]:
     found = []
     for label, table, second_volume in kinds:
         rows = [row for row in table.rows(artefacts) if row["method"] == SHOWN_METHOD]
-        rows = [row for row in rows if (row.get("view") == PLAIN_VIEW) == second_volume]
+        rows = [row for row in rows if (row.get("view") == SECOND_VOLUME) == second_volume]
         if rows:
             found.append((label, mean_text([row["distance_mm"] for row in rows])))
     return found

@@ -11,6 +11,7 @@ from stages.formats.table import Row
 from stages.report.case import SHOWN_METHOD, png_address
 from stages.tables.layout import LANDMARKS, TABLE_5, TABLE_6
 from stages.tables.statistics import reduction_text
+from stages.views import SECOND_VOLUME
 
 Statistics = Sequence[Mapping[str, Any]]
 _COLUMNS = {
@@ -99,8 +100,8 @@ def errors_picture(artefacts: Sequence[Artefact], statistics: Statistics) -> str
     kinds = {
         "lesions in the mammograms": TABLE_5.rows(artefacts),
         "lesions in the MR volumes, from two views": [r for r in TABLE_6.rows(artefacts) if "+" in r["views"]],
-        "landmarks in the mammograms": [row for row in landmarks if row["view"] != "3D"],
-        "landmarks in the compressed volume": [row for row in landmarks if row["view"] == "3D"],
+        "landmarks in the mammograms": [row for row in landmarks if row["view"] != SECOND_VOLUME],
+        "landmarks in the compressed volume": [row for row in landmarks if row["view"] == SECOND_VOLUME],
     }
     panels = [
         ErrorPanel(_sentence(group.split(", ")[0]), _by_method(rows), _paper_means(statistics, group))

@@ -1,18 +1,16 @@
 """Stage `segment`: the breast of the MR volume: tissues, mask, chest-wall surface, nipple; the second volume's mask."""
 
-from dataclasses import replace
-
 import numpy as np
 from pydantic import Field
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import Volume, breast_to_lps
-from mammoreg.geometry.frames import Laterality
+from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
 from stages.cohort.readers.mr import read_mr, read_nifti
-from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value, VolumeField
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.segment.bias import n4_field
+from stages.segment.record import segment_fields
 
 _SAME_PLACE_MM = 0.1
 
@@ -40,12 +38,15 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     choices = SegmentSettings(settings.spacing_mm, _back_settings(settings))
     breast_labels = None if labels is None else labels.to_breast(side)
     found = segment_volume(mr.to_breast(side), breast_labels, choices, n4_field)
-    fields = _fields(found, side)
-    if compressed_path is None:
-        return fields
-    mask = segment_body(read_mr(compressed_path).to_breast(side), settings.spacing_mm)
-    volume = VolumeField(mask.to_lps(side), "1", "body in the compressed volume, chest included")
-    return replace(fields, volumes={**fields.volumes, "compressed_mask": volume})
+    volumes = {
+        "mr": found.mr,
+        "labels": found.mr.with_data(found.labels),
+        "breast_mask": found.mr.with_data(found.breast.astype(np.uint8)),
+    }
+    if compressed_path is not None:
+        second = read_mr(compressed_path).to_breast(side)
+        volumes["compressed_mask"] = segment_body(second, settings.spacing_mm)
+    return segment_fields(volumes, found.back, found.nipple, side, _values(found))
 
 
 def _back_settings(settings: Settings) -> BackSettings:
@@ -63,31 +64,12 @@ def _same_grid(one: Volume, other: Volume) -> bool:
     return bool(np.abs(distances).max() < _SAME_PLACE_MM)
 
 
-def _fields(found: Segmentation, side: Laterality) -> Fields:
-    grid = found.mr
-    volumes = {
-        "mr": VolumeField(grid.to_lps(side), "1", "MR intensity, bias-corrected"),
-        "labels": VolumeField(
-            grid.with_data(found.labels).to_lps(side),
-            "1",
-            "tissue: 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall",
-        ),
-        "breast_mask": VolumeField(
-            grid.with_data(found.breast.astype(np.uint8)).to_lps(side),
-            "1",
-            "breast in front of the chest-wall surface",
-        ),
-    }
-    arrays = {
-        "chest_wall_surface": Array(breast_to_lps(found.back, side), "mm", "points on the back surface of the breast"),
-        "nipple": Array(breast_to_lps(found.nipple, side), "mm", "nipple in the MR volume"),
-    }
-    values: dict[str, Value] = {
+def _values(found: Segmentation) -> dict[str, Value]:
+    return {
         "fat_suppressed": found.fat_suppressed,
-        "breast_volume_ml": round(float(found.breast.sum()) * grid.voxel_mm3 / 1000.0, 3),
+        "breast_volume_ml": round(float(found.breast.sum()) * found.mr.voxel_mm3 / 1000.0, 3),
         "gland_share": round(float((found.labels[found.breast] == 2).mean()), 4),
     }
-    return Fields(arrays=arrays, volumes=volumes, values=values)
 
 
 STAGE = Stage(

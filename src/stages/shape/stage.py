@@ -1,36 +1,22 @@
 """Stage `shape`: 3-D surface of the compressed breast from the compression and the mammogram's outline (II-C)."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from mammoreg.fem.plates.closing import Closed, Closing
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.alignment import Alignment
 from mammoreg.shape.estimate import estimate_shape
-from stages.compress.record import memory_arrays, resumed
+from stages.compress.record import CompressRecord
 from stages.deformed import force_values, mesh_values
-from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.methods import block_mesh, pose_outline, view_geometry
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.mesh.record import MeshRecord
+from stages.pose.record import PoseRecord
+from stages.shape.record import shape_fields
 
 Nodes = NDArray[np.int64]
 TOUCHING_MM = 1.0
-_FACTS = (
-    "penetration_mm",
-    "volume_change",
-    "min_det_f",
-    "force_n",
-    "force_lower_n",
-    "force_upper_n",
-    "contact_lost",
-    "folded_corners",
-    "folded_share",
-    "folded_corner_points",
-    "sideways_drift_mm",
-)
 
 
 class Settings(SettingsModel):
@@ -46,25 +32,20 @@ class Settings(SettingsModel):
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Estimate the surface; without an outline it is that of the compression."""
-    mesh_file, pose, compress = (inputs.artefact(name) for name in ("mesh", "pose", "compress"))
-    mesh = block_mesh(mesh_file)
-    view, lift_mm = view_geometry(pose), float(compress.value("lift_mm"))
-    closing, closed = resumed(mesh_file, compress)
+    mesh_record, pose = MeshRecord(inputs.artefact("mesh")), PoseRecord(inputs.artefact("pose"))
+    mesh, compress = mesh_record.block, CompressRecord(inputs.artefact("compress"))
+    closing, closed = compress.resumed(mesh)
     nodes = np.union1d(mesh.skin_nodes(), _on_plates(mesh.back_nodes(), closing, closed))
-    if not pose.has("outline"):
-        deformed, facts = compress.array("deformed", "mm"), {name: compress.value(name) for name in _FACTS}
-        return _fields(nodes, deformed, closed, {"rounds": 0, **facts})
-    outline = pose_outline(pose)
-    facets = skin_facets(mesh.skin_quads(), len(mesh.points), settings.facets)
-    floating = replace(view, height_mm=view.height_mm - lift_mm)
+    if not pose.has_outline:
+        return shape_fields(nodes, compress.deformed, closed.state, {"rounds": 0, **compress.facts()})
     found = estimate_shape(
         closing,
         closed,
         mesh.skin_quads(),
-        facets,
-        floating,
-        outline,
-        settings.tie_stiffness * float(compress.value("stiffness_ratio")),
+        skin_facets(mesh.skin_quads(), len(mesh.points), settings.facets),
+        compress.frame.view(pose.geometry),
+        pose.outline(),
+        settings.tie_stiffness * compress.stiffness_ratio,
         settings.rounds,
         settings.settled_mm,
     )
@@ -75,9 +56,9 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         "volume_change": found.closed.volume_change,
         "min_det_f": found.closed.min_det_f,
     }
-    lifted = found.closed.deformed + np.array([0.0, 0.0, lift_mm])
-    values |= force_values(found.closed.force_n) | mesh_values(mesh_file, lifted, view.angle_deg)
-    return _fields(nodes, lifted, found.closed, values)
+    deformed = compress.frame.to_plate(found.closed.deformed)
+    values |= force_values(found.closed.force_n) | mesh_values(mesh_record, deformed, pose.geometry.angle_deg)
+    return shape_fields(nodes, deformed, found.closed.state, values)
 
 
 def _misfit(when: str, state: Alignment) -> dict[str, Value]:
@@ -102,19 +83,6 @@ def _drift(nodes: Nodes, before: Closed, after: Closed) -> float:
     """Largest motion along the compression of nodes (B,) that lay on the plates, mm."""
     heights = [closed.deformed[nodes, 2] - closed.height_mm for closed in (before, after)]
     return float(np.abs(heights[1] - heights[0]).max(initial=0.0))
-
-
-def _fields(nodes: Nodes, deformed: Points, closed: Closed, values: dict[str, Value]) -> Fields:
-    return Fields(
-        arrays={
-            "surface_nodes": Array(nodes, "1", "numbers of the mesh nodes on the skin, and of the back on the plates"),
-            "surface": Array(deformed[nodes], "mm", "estimated places of these nodes, plate frame"),
-            "deformed": Array(deformed, "mm", "all mesh nodes as the surface was estimated, plate frame"),
-            "pressure": Array(closed.state.pressure, "kPa", "element pressures there, positive in tension"),
-            **memory_arrays(closed.state.memory),
-        },
-        values=values,
-    )
 
 
 STAGE = Stage(name="shape", schema=3, inputs=("mesh", "pose", "compress"), settings=Settings, run=run)

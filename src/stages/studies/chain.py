@@ -10,6 +10,7 @@ from typing import Any
 from stages.engine.contract import Inputs, Subject
 from stages.engine.registry import STAGE_MODULES, VIEW_STAGES, load_stage
 from stages.engine.run import run_stage
+from stages.pose.record import PoseRecord
 
 _VIEW_FILES = ("image", "lesion", "landmarks")
 
@@ -43,7 +44,7 @@ def plan_of(inputs: Inputs, subject: Subject, given: Sequence[str], again: Seque
     """
     before = {name: inputs.artefacts(name) for name in again}
     settings = {name: json.loads(found[0].attrs["settings"]) for name, found in before.items() if found}
-    rows = {str(pose.view): json.loads(pose.attrs["row"]) for pose in inputs.artefacts("pose")}
+    rows = {str(pose.view): PoseRecord(pose).row for pose in inputs.artefacts("pose")}
     paths = {name: [a.path for a in inputs.artefacts(name)] for name in given if inputs.has(name)}
     paths |= {name: [path] for name, path in inputs.files.items()}
     return Plan(subject, paths, settings, dict(sorted(rows.items())))

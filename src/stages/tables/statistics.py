@@ -15,6 +15,7 @@ from mammoreg.metrics.paper import (
 )
 from mammoreg.metrics.summary import Summary, summarise
 from stages.formats.table import Row
+from stages.views import SECOND_VOLUME
 
 COLUMNS = {
     "n": None,
@@ -67,8 +68,8 @@ def groups(table_5: Sequence[Row], table_6: Sequence[Row], landmarks: Sequence[R
     """The groups that are summarised; only two-view lesions enter Table VI's means."""
     both = [row for row in table_6 if "+" in row["views"]]
     one = [row for row in table_6 if "+" not in row["views"]]
-    carried = [row for row in landmarks if row["view"] == "3D"]
-    projected = [row for row in landmarks if row["view"] != "3D"]
+    carried = [row for row in landmarks if row["view"] == SECOND_VOLUME]
+    projected = [row for row in landmarks if row["view"] != SECOND_VOLUME]
     found = [
         Group("table_5_mammogram", IN_MAMMOGRAMS, table_5, PRINTED["table_5"]),
         Group("table_6_mr", IN_MR, both, PRINTED["table_6"]),

@@ -1,14 +1,16 @@
 """Predictions of one mesh against the truth and against those of the finest mesh."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from mammoreg.metrics.distances import breast_scale_mm
 from stages.engine.artefact import Artefact
-from stages.marks import canonical_pixels
-from stages.methods import METHODS, view_geometry
+from stages.evaluate.record import EvaluateRecord
+from stages.localize.record import Predictions
+from stages.methods import METHODS
+from stages.pose.record import PoseRecord
+from stages.views import SECOND_VOLUME
 
 Opened = Mapping[str, Artefact]
 Result = tuple[float | None, float | None]
@@ -29,7 +31,9 @@ def view_results(view: str, one: Opened, finest: Opened) -> dict[str, Result]:
     if not one["pose"].ok:
         return {}
     here, there = (_places(view, opened) for opened in (one, finest))
-    errors = _errors(view, one["evaluate"])
+    errors: dict[str, list[float]] = {}
+    for method, distance in EvaluateRecord(one["evaluate"]).distances(view):
+        errors.setdefault(method, []).append(distance)
     found = {}
     for method in METHODS:
         places = here.get(method, {})
@@ -41,36 +45,15 @@ def view_results(view: str, one: Opened, finest: Opened) -> dict[str, Result]:
 
 def _places(view: str, opened: Opened) -> dict[str, dict[str, np.ndarray]]:
     """Predicted places by method and name, mm; in a mammogram scaled to the middle of the plates."""
-    localize, pose = opened["localize"], opened["pose"]
-    rows: list[dict[str, Any]] = localize.value(name) if localize.has(name := _rows_name(view)) else []
-    found: dict[str, dict[str, np.ndarray]] = {}
-    for row in rows:
-        place = _place(view, row, pose)
-        if place is not None:
-            found.setdefault(row["method"], {})[row["name"]] = place
-    return found
-
-
-def _rows_name(view: str) -> str:
-    return "compressed_rows" if view == "3D" else "mammogram_rows"
-
-
-def _place(view: str, row: Mapping[str, Any], pose: Artefact) -> np.ndarray | None:
-    if view == "3D":
-        return None if row["x"] is None else np.array([row["x"], row["y"], row["z"]])
-    if row["view"] != view or not row["seen"] or not pose.ok:
-        return None
-    pixel = canonical_pixels(pose, np.array([row["column"], row["row"]]))
-    return np.asarray(pixel * breast_scale_mm(view_geometry(pose)))
-
-
-def _errors(view: str, evaluate: Artefact) -> dict[str, list[float]]:
-    """Distances to the truth by method: landmarks and lesions alike."""
-    found: dict[str, list[float]] = {}
-    for name in ("landmark_rows", "table_5_rows"):
-        for row in evaluate.value(name) if evaluate.has(name) else []:
-            if row["view"] == view and row["distance_mm"] is not None:
-                found.setdefault(row["method"], []).append(float(row["distance_mm"]))
+    predictions, found = Predictions(opened["localize"]), dict[str, dict[str, np.ndarray]]()
+    if view == SECOND_VOLUME:
+        for placed in (row for row in predictions.compressed_rows if row.x is not None):
+            found.setdefault(placed.method, {})[placed.name] = placed.point
+    elif opened["pose"].ok:
+        pose = PoseRecord(opened["pose"])
+        for shown in (row for row in predictions.mammogram_rows if row.view == view and row.seen):
+            place = pose.canonical_pixels(shown.pixel) * breast_scale_mm(pose.geometry)
+            found.setdefault(shown.method, {})[shown.name] = np.asarray(place)
     return found
 
 

@@ -18,6 +18,7 @@ from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
 from stages.methods import METHODS
 from stages.studies.chain import Done, Plan, plan_of, run_chain
 from stages.studies.runtime.comparison import view_results
+from stages.views import IMAGED
 
 CHAIN = ("mesh", "pose", "compress", "shape", "solve", "localize", "evaluate")
 MECHANICS = {"plate": ("compress",), "updated": ("compress", "shape", "solve")}
@@ -112,7 +113,7 @@ STAGE = Stage(
         "calibrate",
         *(stage for stage in CHAIN if stage != "pose"),
         *_FILES,
-        *(f"{name}_{view}" for name in _VIEW_FILES for view in ("CC", "MLO")),
+        *(f"{name}_{view}" for name in _VIEW_FILES for view in IMAGED),
     ),
     settings=Settings,
     run=run,

@@ -12,11 +12,9 @@ from mammoreg.geometry import breast_to_plate, lps_to_breast
 from mammoreg.geometry.frames import Points
 from mammoreg.geometry.quads import area_vectors
 from mammoreg.shape.surface_points import nearest_on_skin
-from stages.compress.record import resumed
-from stages.engine.artefact import Artefact
+from stages.annotations import mr_landmarks
+from stages.compress.record import CompressRecord
 from stages.engine.contract import Inputs
-from stages.localize.to_compressed import drawn_mm
-from stages.marks import mr_landmarks
 from stages.studies.volunteer.case import VolunteerCase
 
 REST_DAMPING = 0.05
@@ -63,7 +61,7 @@ def surface_points(inputs: Inputs, case: VolunteerCase) -> tuple[Points, Points]
 
 
 def draw_to_points(
-    case: VolunteerCase, mesh: Artefact, compress: Artefact, points: tuple[Points, Points], stiffness: float
+    case: VolunteerCase, compress: CompressRecord, points: tuple[Points, Points], stiffness: float
 ) -> Drawn:
     """Go on from `compress` with points of the skin tied to where the second volume shows them.
 
@@ -73,7 +71,7 @@ def draw_to_points(
 
     Args:
         case: the volunteer.
-        mesh, compress: artefacts.
+        compress: of the main run.
         points: as `surface_points` gives them.
         stiffness: of a point's springs, in units of the shear modulus times the size of a skin face.
 
@@ -82,36 +80,35 @@ def draw_to_points(
         NotConvergedError: with the reason.
     """
     start, goal = points
-    lift = np.array([0.0, 0.0, float(compress.value("lift_mm"))])
-    closing, closed = resumed(mesh, compress)
-    quads = case.block.skin_quads()
-    corners, shares = nearest_on_skin(case.block.points, quads, start)
-    away = np.linalg.norm(np.einsum("pa,pai->pi", shares, case.block.points[corners]) - start, axis=1)
+    frame, block = compress.frame, case.mesh.block
+    closing, closed = compress.resumed(block)
+    corners, shares = nearest_on_skin(block.points, block.skin_quads(), start)
+    away = np.linalg.norm(np.einsum("pa,pai->pi", shares, block.points[corners]) - start, axis=1)
     near = away < FARTHEST_MM
     if not near.any():
         raise DataError(f"no surface point lies within {FARTHEST_MM:g} mm of the mesh's skin; check mr_surface_points")
     corners, shares, start, goal = corners[near], shares[near], start[near], goal[near]
-    constant = stiffness * float(compress.value("mu_kpa")) * _face_mm(case)
+    constant = stiffness * compress.mu_kpa * _face_mm(case)
     for _ in range(ROUNDS):
-        skin = np.einsum("pa,pai->pi", shares, (closed.deformed + lift)[corners])
-        way = case.way(closed.deformed + lift)
+        deformed = frame.to_plate(closed.deformed)
+        skin, way = np.einsum("pa,pai->pi", shares, deformed[corners]), case.way(deformed)
         # The points lie a little off the mesh's skin, and stay so.
         off = way.deformation.forward(start) - skin
-        targets = _in_plate_frame(case, closed.deformed + lift, goal) - off - lift
+        targets = frame.from_plate(_in_plate_frame(case, deformed, goal) - off)
         ties = point_ties(closing.points, corners, shares, targets, constant)
         closed = closing.rest(closed, ties, REST_DAMPING)
     left = np.linalg.norm(ties.points(closed.deformed) - targets, axis=1)
-    return Drawn(closed.deformed + lift, closed, len(left), float(left.mean()))
+    return Drawn(frame.to_plate(closed.deformed), closed, len(left), float(left.mean()))
 
 
 def _in_plate_frame(case: VolunteerCase, deformed: Points, goal: Points) -> Points:
     """Where points (P, 3) of the second volume lie in the plate frame of the deformed nodes."""
-    way, drawn = case.way(deformed), drawn_mm(case.pose)
+    way, drawn = case.way(deformed), case.pose.drawn_mm
     placed = goal - case.second.shift(way, drawn)
-    return np.asarray(breast_to_plate(placed, way.geometry.angle_deg) - np.asarray(drawn))
+    return np.asarray(breast_to_plate(placed, way.geometry.angle_deg) - drawn)
 
 
 def _face_mm(case: VolunteerCase) -> float:
     """Side of the skin's mean face."""
-    areas = area_vectors(case.block.points, case.block.skin_quads())
+    areas = area_vectors(case.mesh.block.points, case.mesh.block.skin_quads())
     return float(np.sqrt(np.linalg.norm(areas, axis=1).mean()))

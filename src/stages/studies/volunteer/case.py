@@ -8,15 +8,16 @@ import numpy as np
 
 from mammoreg.geometry import lps_to_breast
 from mammoreg.geometry.frames import Laterality, Points
-from mammoreg.localization.deformation import MeshDeformation, MethodView, ReferenceMesh
+from mammoreg.localization.deformation import MeshDeformation, MethodView
 from mammoreg.localization.to_compressed import SecondVolume
-from mammoreg.meshing.block import BlockMesh
-from stages.engine.artefact import Artefact
+from stages.annotations import mr_landmarks
+from stages.engine.artefact import first_failure
 from stages.engine.contract import Inputs
 from stages.evaluate.elongation import elongation_rows
-from stages.localize.to_compressed import drawn_mm, second_volume, view_in_second_volume
-from stages.marks import mr_landmarks
-from stages.methods import block_mesh, view_geometry
+from stages.localize.to_compressed import second_volume, view_in_second_volume
+from stages.mesh.record import MeshRecord
+from stages.pose.record import PoseRecord
+from stages.segment.record import SegmentRecord
 
 BASE_MM = 1.0
 """Slopes over this base let two variations that differ little be placed alike, to some hundredths of a millimetre."""
@@ -54,30 +55,28 @@ class VolunteerCase:
 
     Attributes:
         pose: of the view that the second volume shows.
-        block: undeformed mesh, breast frame.
-        reference: the same, ready to carry points.
+        mesh: undeformed.
         second: what places results.
         landmarks: in both volumes.
     """
 
-    pose: Artefact
-    block: BlockMesh
-    reference: ReferenceMesh
+    pose: PoseRecord
+    mesh: MeshRecord
     second: SecondVolume
     landmarks: Landmarks
 
     def way(self, deformed: Points) -> MethodView:
         """Deformed nodes (N, 3), plate frame, as a method."""
-        return MethodView(MeshDeformation(self.reference, deformed), view_geometry(self.pose))
+        return MethodView(MeshDeformation(self.mesh.reference, deformed), self.pose.geometry)
 
     def placed(self, deformed: Points) -> Points:
         """The landmarks (L, 3) where deformed nodes put them in the second volume, breast frame."""
-        return self.second.place(self.way(deformed), drawn_mm(self.pose), self.landmarks.before)
+        return self.second.place(self.way(deformed), self.pose.drawn_mm, self.landmarks.before)
 
     def elongations(self, deformed: Points) -> Mapping[str, float | None]:
         """Elongation by direction of deformed nodes, with `true_` before it that of the second volume, mm."""
         found: dict[str, float | None] = {}
-        for row in elongation_rows(self.pose, self.block, {"plate": self.way(deformed)}):
+        for row in elongation_rows(self.pose, self.mesh.block, {"plate": self.way(deformed)}):
             found |= {f"{row['direction']}_mm": row["elongation_mm"], f"true_{row['direction']}_mm": row["true_mm"]}
         return found
 
@@ -93,16 +92,15 @@ def volunteer_landmarks(inputs: Inputs, side: Laterality) -> Landmarks | None:
 
 def volunteer_case(inputs: Inputs, landmarks: Landmarks) -> VolunteerCase | str:
     """The case or, where its stages did not come so far, why not."""
-    for artefact in (a for name in ("segment", "mesh") for a in inputs.artefacts(name)):
-        if not artefact.ok:
-            return artefact.message
+    if failure := first_failure(inputs.artefact(name) for name in ("segment", "mesh")):
+        return str(failure)
     poses = {str(pose.view): pose for pose in inputs.artefacts("pose")}
     view = view_in_second_volume(poses)
-    segment, block = inputs.artefact("segment"), block_mesh(inputs.artefact("mesh"))
-    second = second_volume(segment, block)
+    segment, mesh = SegmentRecord(inputs.artefact("segment")), MeshRecord(inputs.artefact("mesh"))
+    second = second_volume(segment, mesh.block)
     if view is None or second is None:
         return "no second volume shows the compression"
     if not poses[view].ok:
         return poses[view].message
     placing = replace(second, base_mm=BASE_MM)
-    return VolunteerCase(poses[view], block, ReferenceMesh(block.points, block.hexes()), placing, landmarks)
+    return VolunteerCase(PoseRecord(poses[view]), mesh, placing, landmarks)

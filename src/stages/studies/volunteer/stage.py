@@ -16,6 +16,7 @@ from pydantic import Field
 from mammoreg.errors import DataError, NotConvergedError
 from mammoreg.geometry.frames import Points
 from mammoreg.materials.tissue import MATERIALS
+from stages.compress.record import CompressRecord, SolutionRecord
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
 from stages.mechanics import Mechanics
@@ -27,7 +28,6 @@ SKINS = ("none", "attached", "sliding", "adherent")
 TABLES = {"table_2": ("model", MATERIALS), "table_3": ("boundary", ("plate", "additional_points", "updated"))}
 TABLES |= {"table_4": ("skin", SKINS)}
 REFERENCES = {"table_2": "homogeneous", "table_3": "plate", "table_4": "none"}
-REPORTED = ("force_n", "iterations", "load_steps", "min_det_f", "volume_change")
 _GIVEN = ("segment", "mesh", "calibrate", "pose")
 _POINTS = ("mr_landmarks", "mr_compressed_landmarks", "mr_surface_points", "mr_compressed_surface_points")
 
@@ -116,7 +116,7 @@ def _rows(key: str, landmarks: Landmarks, outcomes: Mapping[str, Outcome]) -> li
 
 def _plan(inputs: Inputs, subject: Subject, case: VolunteerCase) -> Plan:
     """What variations run with, in the view that the second volume shows alone."""
-    plan, view = plan_of(inputs, subject, _GIVEN, ("compress",)), str(case.pose.view)
+    plan, view = plan_of(inputs, subject, _GIVEN, ("compress",)), case.pose.view
     return replace(plan, rows={view: plan.rows[view]})
 
 
@@ -143,8 +143,8 @@ def _outcome(case: VolunteerCase, solution: Artefact | None) -> Outcome:
         return Outcome(message="the main run has no result")
     if not solution.ok:
         return Outcome(message=solution.message)
-    report = {name: solution.value(name) for name in REPORTED}
-    return _measured(case, np.asarray(solution.array("deformed", "mm"), dtype=float), report)
+    found = SolutionRecord(solution)
+    return _measured(case, found.deformed, found.report())
 
 
 def _measured(case: VolunteerCase, deformed: Points, report: Mapping[str, Any]) -> Outcome:
@@ -173,7 +173,7 @@ def _drawn(inputs: Inputs, case: VolunteerCase, compress: Artefact | None, setti
     if compress is None or not compress.ok:
         return _outcome(case, compress)
     try:
-        drawn = draw_to_points(case, inputs.artefact("mesh"), compress, points, settings.point_stiffness)
+        drawn = draw_to_points(case, CompressRecord(compress), points, settings.point_stiffness)
     except (DataError, NotConvergedError) as error:
         return Outcome(message=str(error))
     return _measured(case, drawn.deformed, drawn.report())

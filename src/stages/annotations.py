@@ -1,0 +1,82 @@
+"""What users mark, as numerics see it: in the MR volume in LPS, in a mammogram in canonical pixels.
+
+A canonical image has the chest wall at column 0 and its rows run towards medial.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mammoreg.errors import DataError
+from mammoreg.geometry.frames import Points
+from mammoreg.localization.lesions import (
+    LesionArea,
+    MaskLesion,
+    MrLesion,
+    SphereLesion,
+    area_from_disc,
+    area_from_mask,
+)
+from mammoreg.metrics.distances import breast_scale_mm
+from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
+from stages.engine.contract import Inputs
+from stages.pose.record import PoseRecord
+
+MASK_NAME = "lesion"
+
+
+def mr_landmarks(inputs: Inputs, name: str = "mr_landmarks") -> dict[str, Points]:
+    """Landmarks (3,) of an input file by name, LPS mm; none without the file."""
+    path = inputs.path(name)
+    return {} if path is None else read_points(path)
+
+
+def mr_lesions(inputs: Inputs) -> dict[str, MrLesion]:
+    """Lesions of `mr_lesion` by name, LPS mm; none without the file."""
+    path = inputs.path("mr_lesion")
+    if path is None:
+        return {}
+    if path.suffix == ".tsv":
+        return {name: SphereLesion(centre, diameter) for name, (centre, diameter) in read_spheres(path).items()}
+    return {MASK_NAME: MaskLesion(read_mask(path))}
+
+
+def mr_lesion_names(inputs: Inputs) -> list[str]:
+    """Names of the lesions of `mr_lesion`; a mask is not opened for that."""
+    path = inputs.path("mr_lesion")
+    if path is None:
+        return []
+    return list(read_spheres(path)) if path.suffix == ".tsv" else [MASK_NAME]
+
+
+def view_landmarks(inputs: Inputs, view: str) -> dict[str, NDArray[np.float64]]:
+    """Landmarks of a mammogram by name, stored pixels (column, row); none without the file."""
+    path = inputs.path(f"landmarks_{view}")
+    return {} if path is None else read_pixels(path)
+
+
+def view_lesion_names(inputs: Inputs, view: str) -> list[str]:
+    """Names of the lesions marked in a mammogram."""
+    path = inputs.path(f"lesion_{view}")
+    if path is None:
+        return []
+    return list(read_discs(path)) if path.suffix == ".tsv" else [MASK_NAME]
+
+
+def view_areas(inputs: Inputs, pose: PoseRecord) -> dict[str, LesionArea]:
+    """Lesions marked in a view's mammogram by name, canonical pixels; none without the file."""
+    path = inputs.path(f"lesion_{pose.view}")
+    if path is None:
+        return {}
+    if path.suffix != ".tsv":
+        mask, size = read_image_mask(path), (pose.storage.rows, pose.storage.columns)
+        if mask.shape != size:
+            raise DataError(
+                f"{path}: the mask has {mask.shape} rows and columns, its mammogram {size}; draw it on the image"
+            )
+        return {MASK_NAME: area_from_mask(pose.canonical_image(mask))}
+    per_mm = 1.0 / breast_scale_mm(pose.geometry)
+    found = {}
+    for name, (pixel, diameter_mm) in read_discs(path).items():
+        column, row = pose.canonical_pixels(pixel)
+        found[name] = area_from_disc(float(column), float(row), diameter_mm * per_mm)
+    return found

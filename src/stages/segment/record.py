@@ -1,0 +1,104 @@
+"""What stage `segment` leaves: the breast of the MR volume, and the mask of the second one."""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast
+from mammoreg.geometry.frames import Laterality, Points
+from stages.engine.artefact import Array, Fields, Value, VolumeField
+from stages.engine.record import Record
+
+_VOLUMES = {
+    "mr": "MR intensity, bias-corrected",
+    "labels": "tissue: 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall",
+    "breast_mask": "breast in front of the chest-wall surface",
+    "compressed_mask": "body in the compressed volume, chest included",
+}
+
+
+def segment_fields(
+    volumes: Mapping[str, Volume], back: Points, nipple: Points, side: Laterality, values: Mapping[str, Value]
+) -> Fields:
+    """The artefact's contents from what was found in the breast frame.
+
+    Args:
+        volumes: `mr`, `labels`, `breast_mask` and, of a second volume, `compressed_mask`.
+        back: points (N, 3) on the back surface of the breast, mm.
+        nipple: (3,), mm.
+        side: of the breast.
+        values: what else was found.
+    """
+    return Fields(
+        arrays={
+            "chest_wall_surface": Array(breast_to_lps(back, side), "mm", "points on the back surface of the breast"),
+            "nipple": Array(breast_to_lps(nipple, side), "mm", "nipple in the MR volume"),
+        },
+        volumes={name: VolumeField(volume.to_lps(side), "1", _VOLUMES[name]) for name, volume in volumes.items()},
+        values=values,
+    )
+
+
+class SegmentRecord(Record):
+    """The segmented breast; each property in the breast frame unless its name ends in `_lps`."""
+
+    @property
+    def mr_lps(self) -> Volume:
+        """MR intensity, bias-corrected."""
+        return self.artefact.volume("mr")
+
+    @property
+    def labels_lps(self) -> Volume:
+        """Label of each voxel's tissue."""
+        return self.artefact.volume("labels")
+
+    @property
+    def breast_mask_lps(self) -> Volume:
+        """The breast in front of the chest-wall surface."""
+        return self.artefact.volume("breast_mask")
+
+    @property
+    def compressed_mask_lps(self) -> Volume | None:
+        """Body in the second volume, chest included; None without one."""
+        return self.artefact.volume("compressed_mask") if self._has_second_volume else None
+
+    @cached_property
+    def _has_second_volume(self) -> bool:
+        return "compressed_mask" in self.artefact.volume_names()
+
+    @property
+    def mr(self) -> Volume:
+        """As `mr_lps`."""
+        return self.mr_lps.to_breast(self.laterality)
+
+    @property
+    def labels(self) -> Volume:
+        """As `labels_lps`."""
+        return self.labels_lps.to_breast(self.laterality)
+
+    @property
+    def breast_mask(self) -> Volume:
+        """As `breast_mask_lps`."""
+        return self.breast_mask_lps.to_breast(self.laterality)
+
+    @property
+    def compressed_mask(self) -> Volume | None:
+        """As `compressed_mask_lps`."""
+        mask = self.compressed_mask_lps
+        return None if mask is None else mask.to_breast(self.laterality)
+
+    @property
+    def nipple_lps(self) -> Points:
+        """Nipple (3,), mm."""
+        return np.asarray(self.artefact.array("nipple", "mm"), dtype=float)
+
+    @property
+    def nipple(self) -> Points:
+        """As `nipple_lps`."""
+        return lps_to_breast(self.nipple_lps, self.laterality)
+
+    @property
+    def chest_wall(self) -> Points:
+        """Points (N, 3) on the back surface of the breast, mm."""
+        return lps_to_breast(self.artefact.array("chest_wall_surface", "mm"), self.laterality)
