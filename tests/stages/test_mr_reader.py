@@ -12,8 +12,8 @@ from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import ExplicitVRLittleEndian, MRImageStorage, generate_uid
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import Volume
-from stages.cohort.readers.mr import lps_volume, read_mr, read_nifti
+from mammoreg.geometry import Volume, volume_of_affine
+from stages.cohort.readers.mr import read_mr, read_nifti
 from tests.shared_data import DATA, requires_shared
 
 TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -39,7 +39,7 @@ def test_every_axis_order_and_direction_lands_in_lps(axes: list[int], signs: tup
     affine = np.eye(4)
     affine[:3, :3] = np.eye(3)[:, axes] * signs * np.array([1.0, 1.5, 2.5])
     affine[:3, 3] = [-20.0, 15.0, 4.0]
-    volume = lps_volume(sampled(affine, (9, 10, 11)), affine, order=1)
+    volume = volume_of_affine(sampled(affine, (9, 10, 11)), affine, order=1)
     assert np.allclose(volume.data, linear_field(centres(volume)))
     assert np.all(volume.spacing > 0.0)
     assert volume.data.size == 9 * 10 * 11
@@ -54,7 +54,7 @@ def test_oblique_volumes_are_resampled(angles: tuple[float, float, float]) -> No
     affine[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix() * np.array([1.0, 1.5, 2.0])
     affine[:3, 3] = [-20.0, 15.0, 4.0]
     data = sampled(affine, (12, 13, 14))
-    volume = lps_volume(data, affine, order=1)
+    volume = volume_of_affine(data, affine, order=1)
     inside = volume.data > 0.0
     assert np.allclose(volume.data[inside], linear_field(centres(volume))[inside], atol=0.1)
     middle = affine[:3, :3] @ np.array([5.5, 6.0, 6.5]) + affine[:3, 3]

@@ -17,8 +17,17 @@ angle. In an image as usually stored, rows of pixels run between chest wall and 
 what lies in front of it.
 """
 
+from mammoreg.geometry.affine import volume_of_affine
 from mammoreg.geometry.frames import breast_to_lps, breast_to_plate, lps_to_breast, plate_to_breast
 from mammoreg.geometry.view import ViewGeometry
 from mammoreg.geometry.volume import Volume
 
-__all__ = ["ViewGeometry", "Volume", "breast_to_lps", "breast_to_plate", "lps_to_breast", "plate_to_breast"]
+__all__ = [
+    "ViewGeometry",
+    "Volume",
+    "breast_to_lps",
+    "breast_to_plate",
+    "lps_to_breast",
+    "plate_to_breast",
+    "volume_of_affine",
+]

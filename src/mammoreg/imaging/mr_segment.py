@@ -28,6 +28,11 @@ REACH_MM = np.array([90.0, 210.0, 110.0])
 MARGIN_MM = 18.0
 
 
+def no_bias(volume: Volume, mask: Mask) -> NDArray[np.float32]:
+    """The field of a coil without inhomogeneity."""
+    return np.ones(volume.shape, dtype=np.float32)
+
+
 @dataclass(frozen=True)
 class SegmentSettings:
     """Choices of the segmentation: working grid's spacing in mm, and those of the back."""

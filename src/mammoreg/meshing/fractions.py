@@ -4,12 +4,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.geometry import Volume
+from mammoreg.labels import BREAST, Label
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import jacobians, shape_functions
 
 Floats = NDArray[np.float64]
 
 _SAMPLES_A_SIDE = 6
+
+
+def gland_fraction(mesh: BlockMesh, labels: Volume) -> Floats:
+    """Volume fraction (n^3,) of gland among the tissues of the breast in each element, by a volume of labels."""
+    return tissue_fraction(mesh, labels, Label.GLAND, BREAST)
 
 
 def tissue_fraction(mesh: BlockMesh, labels: Volume, tissue: int, counted: tuple[int, ...]) -> Floats:
