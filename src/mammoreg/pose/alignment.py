@@ -10,7 +10,7 @@ from mammoreg.geometry.frames import Points
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import Silhouette, detector_mm
 
-HUBER_MM = 4.0  # gaps beyond this (folds, a nipple in profile) pull with constant force
+HUBER_MM = 4.0  # chosen: gaps beyond this (folds, a nipple in profile) pull with constant force
 ITERATIONS = 12
 SETTLED_MM = 0.01
 LONGEST_STEP_MM = 15.0

@@ -14,7 +14,7 @@ from mammoreg.pose.outline import RadialOutline
 
 SHARES = (0.8, 0.7, 0.6, 0.5, 0.4)
 TYPICAL_SHARE = 0.645  # middle of the paper's compressions of 21 % and 50 %
-SPREAD = 0.1
+SPREAD = 0.1  # chosen: the paper's two compressions lie one and a half of it to either side
 EDGE_PASSES = 2
 
 

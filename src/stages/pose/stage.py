@@ -36,7 +36,9 @@ class Settings(SettingsModel):
         4.0, ge=0.0, le=20.0, description="distance of the angles tried, degrees; 0 keeps the header's angle"
     )
     angle_bound_deg: float = Field(16.0, gt=0.0, le=45.0, description="largest offset from the header's angle, degrees")
-    angle_sd_deg: float = Field(5.0, gt=0.0, le=30.0, description="standard deviation of the header's angle, degrees")
+    angle_sd_deg: float = Field(
+        5.0, gt=0.0, le=30.0, description="standard deviation of the header's angle, chosen, degrees"
+    )
     use_density: bool = Field(True, description="let dense tissue judge the angle beside the outline")
 
 

@@ -20,7 +20,7 @@ from stages.pose.view_facts import ViewFacts
 
 THICKNESS_AT_BOUND = "estimated thickness at the bound of its search"
 FAR_SOURCE_MM = 1.0e7  # whose beams are parallel
-EDGE_QUANTILE = 0.25  # a plate's edge reaches in front of most, not all, of the breast's back
+EDGE_QUANTILE = 0.25  # chosen: a plate's edge reaches in front of most, not all, of the breast's back
 
 
 def start_view(
