@@ -12,7 +12,9 @@ from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
+from stages.methods import METHODS
 from tests.stages import synthetic_case as synthetic
+from tests.stages.xarray_volumes import check_volumes
 
 LESION = np.array([12.0, -40.0, 9.0])
 POINTS = {"p1": np.array([-20.0, -30.0, 15.0]), "p2": np.array([5.0, -60.0, -25.0]), "deep": np.array([0.0, 60.0, 0.0])}
@@ -60,6 +62,10 @@ def both_ways(tmp_path_factory: pytest.TempPathFactory) -> Artefact:
     inputs = synthetic.write_case(folder, compressed=True)
     marks = mr_marks(folder, "R") | view_marks(folder, ("CC", "MLO"), (False, False))
     return localized(inputs | marks, folder / "localize.h5")
+
+
+def test_xarray_opens_the_regions(both_ways: Artefact) -> None:
+    check_volumes(both_ways, {f"mr/{method}/lesion0/region" for method in METHODS})
 
 
 @pytest.mark.parametrize("method", ["scaling", "plate", "updated"])

@@ -26,6 +26,7 @@ from tests.stages.synthetic_case import (
     write_case,
     write_failed,
 )
+from tests.stages.xarray_volumes import check_volumes
 
 GLAND = np.array([12.0, -30.0, 8.0])
 STEP = 3
@@ -85,6 +86,10 @@ def _run(inputs, folder, laterality="R", view="CC"):
 def projected(tmp_path_factory):
     folder = tmp_path_factory.mktemp("project")
     return _run(_inputs(folder), folder)
+
+
+def test_xarray_opens_the_deformed_volumes(projected):
+    check_volumes(projected, {"plate/mr", "updated/mr"})
 
 
 @pytest.mark.parametrize("method", ["scaling", "plate", "updated"])

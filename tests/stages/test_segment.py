@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from stages.cohort.readers.mr import read_nifti
+from stages.engine.artefact import Artefact, write_artefact
 from stages.engine.contract import Fields, Inputs, Subject
 from stages.segment.stage import Settings, run
 from tests.shared_data import DATA, requires_shared
+from tests.stages.synthetic_case import header
+from tests.stages.xarray_volumes import check_volumes
 from tests.unit.torso_phantom import RIGHT, torso
 
 SETTINGS = Settings(spacing_mm=2.0)
@@ -53,6 +56,8 @@ def test_second_volume_leaves_only_its_mask(tmp_path: Path) -> None:
     assert mask.sample(RIGHT_BREAST_AND_CHEST, order=0).tolist() == [1.0, 1.0]
     assert set(fields.volumes) == {"mr", "labels", "breast_mask", "compressed_mask"}
     assert not [name for name in fields.values if "compressed" in name]
+    write_artefact(tmp_path / "segment.h5", header("segment", "R"), fields)
+    check_volumes(Artefact(tmp_path / "segment.h5"), {"mr", "labels", "breast_mask", "compressed_mask"})
 
 
 def test_nipple_and_volume_are_those_of_the_phantom(tmp_path: Path) -> None:

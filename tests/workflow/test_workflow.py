@@ -1,5 +1,6 @@
 """The workflow on toy stages: whole cohorts, reruns, failures, targets, lint."""
 
+import csv
 import os
 import subprocess
 import sys
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.workflow.toy_project import PROJECT, make_cohort, make_project, snakemake, spoil
+from tests.workflow.toy_project import PROJECT, inject_bug, make_cohort, make_project, snakemake, spoil
 
 NOTHING = "Nothing to be done"
 
@@ -164,21 +165,60 @@ def test_paper_s_tables_are_made_of_the_volunteers_alone(finished):
     assert not (results / "report.html").exists()
 
 
-def test_volume_of_nan_among_three_ends_its_case_only(tmp_path):
-    project = make_project(tmp_path / "project")
-    cohort = make_cohort(tmp_path / "data")
+@pytest.fixture(scope="module")
+def among_three(tmp_path_factory):
+    """A cohort of three, one of them NaN, one with a bug in one of its views; tables and report are the real ones."""
+    folder = tmp_path_factory.mktemp("three")
+    project = make_project(folder / "project", real=("tables", "report"))
+    cohort = make_cohort(folder / "data")
     spoil(cohort / "b.nii.gz")
-    done = snakemake(project, *_keys(cohort))
-    assert done.returncode != 0
-    assert "1 of 3 cases did not finish" in done.stdout
-    assert "b: segment: b.nii.gz: holds NaN" in done.stdout
+    inject_bug(project, "compress", "(subject.case, subject.view) == ('c', 'MLO')")
+    return project, snakemake(project, *_keys(cohort))
+
+
+def test_volume_of_nan_and_a_bug_end_their_cases_only(among_three):
+    project, _ = among_three
     results = project / "my results"
-    assert (results / "tables.h5").exists()
-    assert (results / "report.html").exists()
-    assert not (results / "tables" / "complete.txt").exists()
-    assert (results / "c" / "figures.h5").exists()
+    assert (results / "a" / "figures.h5").exists()
+    assert (results / "c" / "solve.CC.h5").exists()
+    with (results / "tables" / "failures.csv").open() as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == ["case", "view", "stage", "status", "message"]
+    assert rows[1] == ["b", "", "segment", "failed", "b.nii.gz: holds NaN; export the volume again"]
+    assert rows[2][:4] == ["c", "MLO", "compress", "bug"]
+    assert len(rows) == 3
+    page = (results / "report.html").read_text()
+    assert "1 of 3" in page
+    assert "holds NaN" in page
+    assert "stopped by a bug (ZeroDivisionError in stages.compress.stage.run)" in page
+
+
+def test_failures_end_the_run_with_a_list_and_not_zero(among_three):
+    project, done = among_three
+    assert done.returncode != 0
+    assert "2 of 3 cases did not finish" in done.stdout
+    assert "b: segment: b.nii.gz: holds NaN" in done.stdout
+    assert "c MLO: compress: stopped by a bug" in done.stdout
+    assert not (project / "my results" / "tables" / "complete.txt").exists()
+
+
+def test_traceback_stands_in_the_log_and_nowhere_else(among_three):
+    project, done = among_three
+    results = project / "my results"
+    bug, data = (results / "logs" / name for name in ("c/compress.MLO.log", "b/segment.log"))
+    assert bug.read_text().startswith("python -m stages run compress")
+    assert "ZeroDivisionError: /secret/Jane" in bug.read_text()
+    assert "DataError" in data.read_text()
+    assert "Traceback" in data.read_text()
+    assert "/secret" not in done.stdout
+    for path in (*(results / "c").glob("*.h5"), *(results / "tables").iterdir(), results / "report.html"):
+        assert b"/secret" not in path.read_bytes(), path.name
+
+
+def test_origin_is_shown_of_what_later_stages_pass_on(among_three):
+    project, _ = among_three
     shown = subprocess.run(
-        [sys.executable, "-m", "stages", "show", str(results / "b" / "solve.CC.h5")],
+        [sys.executable, "-m", "stages", "show", str(project / "my results" / "b" / "solve.CC.h5")],
         env=os.environ | {"PYTHONPATH": str(project / "src")},
         capture_output=True,
         text=True,

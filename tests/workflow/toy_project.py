@@ -71,8 +71,8 @@ STAGE = Stage({name!r}, 1, {required!r}, Settings, run, {optional!r}, {takes_fai
 '''
 
 
-def make_project(folder: Path) -> Path:
-    """Copy the workflow and the stages' machinery, with toy stages in place of the numerics."""
+def make_project(folder: Path, real: tuple[str, ...] = ()) -> Path:
+    """Copy the workflow and the stages' machinery, with toy stages in place of the numerics but for `real`."""
     folder.mkdir()
     for name in ("Snakefile", "workflow", "profiles", "config"):
         source = PROJECT / name
@@ -80,6 +80,8 @@ def make_project(folder: Path) -> Path:
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(PROJECT / "src", folder / "src", ignore=ignored)
     for name, (required, optional) in INPUTS.items():
+        if name in real:
+            continue
         module = folder.joinpath("src", *STAGE_MODULES[name].split(".")).with_suffix(".py")
         module.write_text(
             TOY_STAGE.format(
@@ -126,3 +128,11 @@ def snakemake(project: Path, *arguments: str) -> subprocess.CompletedProcess[str
     return subprocess.run(
         command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )
+
+
+def inject_bug(project: Path, stage: str, condition: str) -> None:
+    """Let a toy stage raise an exception that it does not know where a condition on `subject` holds."""
+    module = project.joinpath("src", *STAGE_MODULES[stage].split(".")).with_suffix(".py")
+    start = "def run(inputs, settings, subject):\n"
+    bug = f"    if {condition}:\n        raise ZeroDivisionError('/secret/Jane')\n"
+    module.write_text(module.read_text().replace(start, start + bug))

@@ -1,6 +1,7 @@
 """What the paper says of Tables III, V and VI, judged by the cohort's lesions and landmarks."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from mammoreg.metrics.findings import Claim, Numbers, judged, lower, numbers_of
 from mammoreg.metrics.summary import LIMIT_MM
@@ -79,14 +80,25 @@ CLAIMS = {
 
 
 def cohort_findings(groups: Sequence[Group]) -> list[list[str]]:
-    """The statements that a cohort's tables can judge, as rows."""
+    """The statements that a cohort's tables can judge, as rows.
+
+    Where a method could not predict all that has a truth, n of N stands behind the numbers, of the one with the fewest.
+    """
     here: dict[str, float] = {}
+    counts: dict[str, str] = {}
     paper: dict[str, float] = {}
     for group in groups:
         if table := _TABLE_OF.get(group.label):
-            here |= numbers_of({f"{table} {method}": summary for method, summary in summaries(group).items()})
+            found = summaries(group)
+            here |= numbers_of({f"{table} {method}": summary for method, summary in found.items()})
+            fewest = min(found.values(), key=lambda summary: summary.n)
+            counts[table] = f" ({fewest.n} of {fewest.of})" if fewest.n < fewest.of else ""
     for table, printed in PRINTED.items():
         paper |= numbers_of({f"{table} {method}": summary for method, (summary, _) in printed.items()})
-    return [
-        row for table, claims in CLAIMS.items() for row in findings_rows(table, "cohort", judged(claims, paper, here))
-    ]
+    rows = []
+    for tables, claims in CLAIMS.items():
+        count = "".join(counts.get(table, "") for table in tables.split(" and "))
+        findings = judged(claims, paper, here)
+        counted = [replace(finding, here=finding.here and finding.here + count) for finding in findings]
+        rows += findings_rows(tables, "cohort", counted)
+    return rows
