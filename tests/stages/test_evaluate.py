@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mammoreg.geometry import breast_to_lps, plate_to_breast
-from stages.engine.artefact import Array, Artefact, Fields, write_artefact
+from stages.engine.artefact import Artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
 from tests.stages import synthetic_case as synthetic
@@ -204,9 +204,7 @@ def test_a_mask_of_another_size_is_told_once(tmp_path: Path) -> None:
 def test_columns_of_the_solution_and_of_what_was_estimated(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path, views=("CC",))
     solved = {"force_lower_n": 60.0, "force_upper_n": 64.0, "penetration_mm": 1.25, "folded_corners": 3}
-    old = Artefact(inputs["solve"][0])
-    again = Fields({"deformed": Array(old.array("deformed", "mm"), "mm", "nodes")}, values=solved)
-    write_artefact(inputs["solve"][0], synthetic.header("solve", "R", "CC"), again)
+    synthetic.write_solution(inputs["solve"][0], "R", "solve", "CC", solved | {"folded_share": 0.01})
     rows = {row["method"]: row for row in evaluated(tmp_path, inputs).value("view_rows")}
     names = ("force_n", "penetration_mm", "folded_corners", "outline_step", "estimated")
     assert [rows["updated"][name] for name in names] == [62.0, 1.25, 3.0, None, "source_detector_mm"]
@@ -224,10 +222,7 @@ def test_columns_of_the_solution_and_of_what_was_estimated(tmp_path: Path) -> No
 )
 def test_another_compression_than_the_table_s_warns(tmp_path: Path, views: tuple[str], told: str, trust: str) -> None:
     inputs = synthetic.write_case(tmp_path, views=views, compressed=views == ("3D",))
-    old = Artefact(inputs["compress"][0])
-    values = {name: old.value(name) for name in old.value_names()} | {"compression": 0.4}
-    again = Fields({"deformed": Array(old.array("deformed", "mm"), "mm", "nodes")}, values=values)
-    write_artefact(inputs["compress"][0], synthetic.header("compress", "R", views[0]), again)
+    synthetic.write_solution(inputs["compress"][0], "R", "compress", views[0], {"compression": 0.4})
     found = evaluated(tmp_path, inputs, row={"compression": told} if told else {})
     assert {row["trust"] for row in found.value("view_rows") if row["method"] in ("plate", "updated")} == {trust}
 
