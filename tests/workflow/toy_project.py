@@ -58,7 +58,7 @@ def run(inputs, settings, subject):
             raise DataError(f"{{mr}}: holds NaN; export the volume again")
     failed = [a for found in inputs.stages.values() for a in found if not a.ok]
     failure = failed[0].failure if failed and {name!r} == "evaluate" else None
-    from stages.tables.layout import CSV_FILES
+    from stages.tables.record import CSV_FILES
     files = {{
         "report": {{"report.html": b"report"}},
         "tables": {{name: b"table" for name in ("cohort.nc", *CSV_FILES)}},

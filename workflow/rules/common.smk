@@ -17,7 +17,7 @@ from stages.engine.registry import (
     load_stage,
     stage_digest,
 )
-from stages.tables.layout import CSV_FILES
+from stages.tables.record import CSV_FILES
 
 PROJECT = Path(workflow.basedir)
 

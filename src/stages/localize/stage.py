@@ -12,11 +12,12 @@ from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_a
 from stages.engine.artefact import Artefact, Fields, first_failure
 from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
 from stages.localize.record import compressed_fields, mammogram_fields, mr_fields
-from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed, second_volume
+from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed
 from stages.localize.to_mammogram import missing_in_mammograms, predict_in_mammograms
 from stages.localize.to_mr import Anatomy, missing_in_mr, predict_in_mr
 from stages.localize.views import CaseViews, case_views, lost_views
 from stages.mesh.record import MeshRecord
+from stages.second_volume import second_volume
 from stages.segment.record import SegmentRecord
 from stages.views import IMAGED
 

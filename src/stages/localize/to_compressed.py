@@ -1,34 +1,17 @@
 """Into the compressed MR volume: landmarks carried by each method, placed by that volume's outline alone."""
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from mammoreg.geometry import breast_to_lps
 from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.to_compressed import SecondVolume
-from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Fields
 from stages.localize.record import CompressedRow, compressed_fields
 from stages.localize.views import CaseViews
 from stages.methods import METHODS
-from stages.segment.record import SegmentRecord
-from stages.views import IMAGED, SECOND_VOLUME
-
-_SKIN_PARTS = 2
-
-
-def second_volume(segment: SegmentRecord, block: BlockMesh) -> SecondVolume | None:
-    """The second volume of a case, None without one."""
-    mask = segment.compressed_mask
-    if mask is None:
-        return None
-    return SecondVolume(mask, block.skin_points(_SKIN_PARTS))
-
-
-def view_in_second_volume(views: Container[str]) -> str | None:
-    """The view whose compression the second volume shows."""
-    return next((view for view in (SECOND_VOLUME, *IMAGED) if view in views), None)
+from stages.second_volume import view_in_second_volume
 
 
 def predict_in_compressed(

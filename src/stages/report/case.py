@@ -8,9 +8,11 @@ from typing import Any
 from mammoreg.metrics.summary import summarise
 from stages.engine.artefact import Artefact
 from stages.engine.completion import first_failures
+from stages.figures.record import FiguresRecord
 from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
-from stages.tables.layout import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
+from stages.localize.record import Predictions
+from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
 from stages.views import SECOND_VOLUME
 
 SHOWN_METHOD = "updated"
@@ -59,8 +61,8 @@ def case_page(name: str, laterality: str, artefacts: Sequence[Artefact]) -> Case
         [f"{failure.view}: {failure}" if failure.view else str(failure) for failure in failures],
         _warnings(artefacts),
         _headline(artefacts),
-        any(name.startswith("export/") for a in artefacts if a.has("files") for name in a.value("files")),
-        [picture for a in artefacts if a.stage == "figures" for picture in _pictures(a)],
+        any(FiguresRecord(a).exported for a in artefacts if a.stage == "figures"),
+        [picture for a in artefacts if a.stage == "figures" for picture in _pictures(FiguresRecord(a))],
         [section for section in _sections(artefacts) if section.rows],
     )
 
@@ -102,14 +104,12 @@ def mean_text(distances: Sequence[float | None]) -> str:
     return "no prediction" if summary.mean_mm is None else f"{summary.mean_mm:.1f} mm{count}"
 
 
-def _pictures(figures: Artefact) -> list[ReportPicture]:
-    listed: list[dict[str, str]] = figures.value("pictures") if figures.has("pictures") else []
-    return [ReportPicture(p["title"], p["caption"], _address(figures, p["name"])) for p in listed]
+def _pictures(figures: FiguresRecord) -> list[ReportPicture]:
+    return [ReportPicture(p.title, p.caption, _address(figures.png(p))) for p in figures.pictures]
 
 
-def _address(figures: Artefact, name: str) -> str | None:
-    path = figures.path.parent / "figures" / f"{name}.png"
-    return png_address(path.read_bytes()) if path.is_file() else None
+def _address(png: bytes | None) -> str | None:
+    return None if png is None else png_address(png)
 
 
 def png_address(content: bytes) -> str:
@@ -118,7 +118,7 @@ def png_address(content: bytes) -> str:
 
 
 def _sections(artefacts: Sequence[Artefact]) -> list[Section]:
-    lesions = {name for a in artefacts if a.stage == "localize" for name in _names(a, "mr_lesion_names")}
+    lesions = {name for a in artefacts if a.stage == "localize" for name in Predictions(a).mr_lesions}
     return [
         _section("Lesion predicted in the mammogram", PREDICTIONS_MAMMOGRAM, artefacts, lesions),
         _section("Lesion predicted in the MR volume (LPS, mm)", PREDICTIONS_MR, artefacts),
@@ -127,10 +127,6 @@ def _sections(artefacts: Sequence[Artefact]) -> list[Section]:
         section_of("Landmarks against the truth", _landmark_rows(artefacts)),
         _turned(_section("Pose and fit of each view", VIEWS, artefacts)),
     ]
-
-
-def _names(localize: Artefact, value: str) -> list[str]:
-    return list(localize.value(value)) if localize.has(value) else []
 
 
 def _section(heading: str, table: Table, artefacts: Sequence[Artefact], names: set[str] | None = None) -> Section:

@@ -9,8 +9,7 @@ from stages.engine.artefact import Artefact
 from stages.formats.pages import Section
 from stages.formats.table import Row
 from stages.report.case import SHOWN_METHOD, png_address
-from stages.tables.layout import LANDMARKS, TABLE_5, TABLE_6
-from stages.tables.statistics import reduction_text
+from stages.tables.record import LANDMARKS, TABLE_5, TABLE_6, reduction_text
 from stages.views import SECOND_VOLUME
 
 Statistics = Sequence[Mapping[str, Any]]

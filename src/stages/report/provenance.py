@@ -7,6 +7,7 @@ from typing import Any
 
 from stages.engine.artefact import Artefact
 from stages.formats.pages import Section
+from stages.mesh.record import MeshRecord
 
 _LIBRARIES = ("numpy", "scipy", "scikit-fem", "scikit-image", "pypardiso", "simpleitk", "nibabel", "pydicom", "h5py")
 
@@ -36,7 +37,7 @@ METHODS_TEXT = (
 
 def methods_paragraph(artefacts: Sequence[Artefact]) -> str:
     """The methods text for these artefacts."""
-    meshes = sorted({int(a.value("n")) for a in artefacts if a.stage == "mesh" and a.has("n")})
+    meshes = sorted({MeshRecord(a).elements for a in artefacts if a.stage == "mesh" and a.ok})
     elements = " or ".join(f"{n} x {n} x {n}" for n in meshes) or "n x n x n"
     versions = sorted({a.attrs["package_version"] for a in artefacts if "package_version" in a.attrs})
     settings = _mechanics_settings(artefacts)

@@ -9,7 +9,7 @@ from stages.engine.registry import CASE_STAGES, VIEW_STAGES
 from stages.report.case import case_page
 from stages.report.cohort import cards, errors_picture, excluded_rows, findings_section, statistics_sections
 from stages.report.provenance import methods_paragraph, settings_section, versions_section
-from stages.tables.layout import TABLES
+from stages.tables.record import TABLES, TablesRecord
 
 TEMPLATES = Path(__file__).parent / "templates"
 _ORDER = ("segment", "mesh", *VIEW_STAGES, "localize", "evaluate", "figures")
@@ -26,7 +26,8 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     pages = [
         case_page(name, row.laterality, [a for a in artefacts if a.case == name]) for name, row in cohort.cases.items()
     ]
-    statistics = inputs.artefact("tables").value("statistics")
+    tables = TablesRecord(inputs.artefact("tables"))
+    statistics = tables.statistics
     done = sum(page.status == "ok" for page in pages)
     html = _render(
         cards=cards(statistics, done, len(pages)),
@@ -34,7 +35,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         excluded=excluded_rows(cohort),
         errors=errors_picture(artefacts, statistics),
         statistics=statistics_sections(statistics),
-        findings=findings_section(inputs.artefact("tables").value("findings")),
+        findings=findings_section(tables.findings),
         tables=[(table.title, f"tables/{table.name}") for table in TABLES],
         methods=methods_paragraph(artefacts),
         settings=settings_section(_with_settings(inputs, artefacts)),

@@ -7,23 +7,33 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
+from stages.bias import n4_field
 from stages.cohort.readers.mr import read_mr, read_nifti
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.segment.bias import n4_field
 from stages.segment.record import segment_fields
 
 _SAME_PLACE_MM = 0.1
+_DEFAULTS = SegmentSettings()
 
 
 class Settings(SettingsModel):
     """The working grid, and where the breast's back lies."""
 
-    spacing_mm: float = Field(1.4, ge=1.0, le=3.0, description="voxels of the working grid, mm (paper: 1.4)")
-    forward_share: float = Field(
-        0.05, ge=0.0, le=0.5, description="back in front of the corners between breast and chest, share of their depth"
+    spacing_mm: float = Field(
+        _DEFAULTS.spacing_mm, ge=1.0, le=3.0, description="voxels of the working grid, mm (paper: 1.4)"
     )
-    max_depth_mm: float = Field(120.0, ge=40.0, le=250.0, description="greatest depth of the model below the apex, mm")
-    min_depth_mm: float = Field(20.0, ge=5.0, le=40.0, description="a breast that stands out less is refused, mm")
+    forward_share: float = Field(
+        _DEFAULTS.back.forward_share,
+        ge=0.0,
+        le=0.5,
+        description="back in front of the corners between breast and chest, share of their depth",
+    )
+    max_depth_mm: float = Field(
+        _DEFAULTS.back.max_depth_mm, ge=40.0, le=250.0, description="greatest depth of the model below the apex, mm"
+    )
+    min_depth_mm: float = Field(
+        _DEFAULTS.back.min_depth_mm, ge=5.0, le=40.0, description="a breast that stands out less is refused, mm"
+    )
 
 
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:

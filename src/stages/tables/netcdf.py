@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from stages.formats.table import Row, Table
-from stages.tables.layout import (
+from stages.tables.record import (
     ELONGATION,
     LANDMARKS,
     PREDICTIONS_COMPRESSED,

@@ -9,8 +9,8 @@ from stages.formats.findings import FINDINGS
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
 from stages.tables.findings import cohort_findings
-from stages.tables.layout import FAILURES, LANDMARKS, TABLE_5, TABLE_6, TABLES
 from stages.tables.netcdf import cohort_netcdf
+from stages.tables.record import FAILURES, LANDMARKS, TABLE_5, TABLE_6, TABLES, tables_fields
 from stages.tables.statistics import Group, groups, incomplete, readable_rows, statistics_rows
 
 _INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate", "figures")
@@ -35,7 +35,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     files["summary.csv"] = as_csv(overview.columns, overview.rows)
     files["findings.csv"] = as_csv(FINDINGS, findings)
     files["failures.csv"] = as_csv(FAILURES, [[case, f.view, f.stage, f.status, f.message] for case, f in failures])
-    return Fields(files=files, values={"statistics": statistics, "findings": findings, "failures": _texts(failures)})
+    return tables_fields(files, statistics, findings, _texts(failures))
 
 
 def _texts(failures: Sequence[tuple[str, Failure]]) -> list[str]:

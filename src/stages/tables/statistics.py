@@ -15,6 +15,7 @@ from mammoreg.metrics.paper import (
 )
 from mammoreg.metrics.summary import Summary, summarise
 from stages.formats.table import Row
+from stages.tables.record import reduction_text
 from stages.views import SECOND_VOLUME
 
 COLUMNS = {
@@ -126,12 +127,6 @@ def _words(row: Mapping[str, str], prefix: str) -> dict[str, str]:
         "overlap, %": of("overlap_percent"),
     }
     return {f"{'paper: ' if prefix else ''}{name}": text for name, text in words.items()}
-
-
-def reduction_text(row: Mapping[str, str], prefix: str = "") -> str:
-    """By how much a mean lies below that of `rigid`, in percent, with how many of all were compared."""
-    percent, compared, of = (row[f"{prefix}{name}"] for name in ("reduction_percent", "compared", "of"))
-    return f"{percent} ({compared} of {of})" if percent else ""
 
 
 def incomplete(rows: Sequence[Mapping[str, Any]]) -> list[str]:

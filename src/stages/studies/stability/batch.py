@@ -7,7 +7,6 @@ from typing import Any
 from pydantic import Field
 
 from mammoreg.errors import DataError, NotConvergedError
-from mammoreg.geometry import lps_to_breast
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.scenes.bodies import body_mesh
 from mammoreg.scenes.design import stability_design
@@ -16,6 +15,7 @@ from mammoreg.scenes.trial import Trial, try_scenario
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
 from stages.studies.stability.isolated import in_own_process
+from stages.studies.stability.record import ScanMeshRecord
 
 NO_SCAN = "not run: stability_scan is not set"
 NOT_CHOSEN = "not run: left out by stability_batch.only"
@@ -66,8 +66,7 @@ def _tried(scenario: Scenario, scan: Artefact | None, limit_s: float) -> Trial:
 def _mesh(scenario: Scenario, scan: Artefact | None) -> BlockMesh:
     if scenario.shape != SCAN or scan is None:
         return body_mesh(scenario.shape, scenario.elements)
-    points = scan.array(f"points/{scenario.elements}", "mm")
-    return BlockMesh(scenario.elements, lps_to_breast(points, scan.value("laterality")))
+    return ScanMeshRecord(scan).block(scenario.elements)
 
 
 def _row(scenario: Scenario, trial: Trial) -> Mapping[str, Any]:

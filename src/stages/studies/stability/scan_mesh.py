@@ -1,12 +1,16 @@
 """The breast of the scan that the key `stability_scan` names, meshed for the stability study."""
 
+import numpy as np
+
 from mammoreg.errors import DataError
-from mammoreg.geometry import breast_to_lps, lps_to_breast
 from mammoreg.geometry.frames import Laterality
+from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_volume
 from mammoreg.meshing.breast import build_mesh
 from mammoreg.scenes.scenario import LEVELS
-from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject
-from stages.segment import stage as segment
+from stages.bias import n4_field
+from stages.cohort.readers.mr import read_mr
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
+from stages.studies.stability.record import scan_mesh_fields
 
 
 class Settings(SettingsModel):
@@ -16,24 +20,19 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Segment the right breast, or the left one where the scan shows no right one, and mesh it at every size."""
     side, found = _segmented(inputs)
-    mask = found.volumes["breast_mask"].volume.to_breast(side)
-    back, nipple = (lps_to_breast(found.arrays[name].data, side) for name in ("chest_wall_surface", "nipple"))
-    meshes = {n: build_mesh(mask, back, nipple, n).mesh for n in LEVELS["elements"]}
-    arrays = {
-        f"points/{n}": Array(breast_to_lps(mesh.points, side), "mm", f"nodes of the block of {n} elements a side")
-        for n, mesh in meshes.items()
-    }
-    return Fields(arrays=arrays, values={"laterality": side})
+    mask = found.mr.with_data(found.breast.astype(np.uint8))
+    meshes = {n: build_mesh(mask, found.back, found.nipple, n).mesh for n in LEVELS["elements"]}
+    return scan_mesh_fields(meshes, side)
 
 
-def _segmented(inputs: Inputs) -> tuple[Laterality, Fields]:
+def _segmented(inputs: Inputs) -> tuple[Laterality, Segmentation]:
     scan = inputs.path("scan")
     assert scan is not None
-    faults = []
+    mr, faults = read_mr(scan), []
     sides: tuple[Laterality, Laterality] = ("R", "L")
     for side in sides:
         try:
-            return side, segment.run(Inputs({"mr": scan}), segment.Settings(), Subject("stability", side))
+            return side, segment_volume(mr.to_breast(side), None, SegmentSettings(), n4_field)
         except DataError as error:
             faults.append(str(error))
     raise DataError(f"key stability_scan: {faults[0]}")

@@ -11,12 +11,12 @@ from mammoreg.geometry.frames import Laterality, Points
 from mammoreg.localization.deformation import MeshDeformation, MethodView
 from mammoreg.localization.to_compressed import SecondVolume
 from stages.annotations import mr_landmarks
+from stages.elongation import elongation_rows
 from stages.engine.artefact import first_failure
 from stages.engine.contract import Inputs
-from stages.evaluate.elongation import elongation_rows
-from stages.localize.to_compressed import second_volume, view_in_second_volume
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord
+from stages.second_volume import second_volume, view_in_second_volume
 from stages.segment.record import SegmentRecord
 
 BASE_MM = 1.0

@@ -11,6 +11,7 @@ from stages.formats.findings import FINDINGS, findings_rows
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
 from stages.studies.volunteer.paper_sentences import CLAIMS, PAPER, sentences
+from stages.studies.volunteer.record import VolunteerRecord
 from stages.studies.volunteer.stage import REFERENCES
 
 STUDY = "volunteer"
@@ -124,7 +125,7 @@ def _missing(table: Table, artefact: Artefact) -> list[str]:
 
 
 def _runs(table: Table, artefact: Artefact) -> list[Mapping[str, Any]]:
-    return [run for run in artefact.value("runs") if run["table"] == _key(table)]
+    return VolunteerRecord(artefact).runs(_key(table))
 
 
 def _case_sections(table: Table, artefact: Artefact) -> list[Section]:
@@ -164,9 +165,9 @@ def _numbers(summary: Summary | None, prefix: str) -> dict[str, str]:
 def _setting(table: Table, artefact: Artefact) -> str:
     """What the table starts from, in words and settings."""
     which, words = _SETTING[_key(table)]
-    if not artefact.has("mechanics"):
+    keys = VolunteerRecord(artefact).mechanics(which)
+    if keys is None:
         return f"Setting: {words}."
-    keys = artefact.value("mechanics")[which]
     return f"Setting: {words}: {', '.join(f'{key} {value}' for key, value in keys.items())}."
 
 

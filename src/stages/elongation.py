@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from mammoreg.geometry import ViewGeometry, breast_to_plate
 from mammoreg.geometry.frames import Points
@@ -10,13 +11,12 @@ from mammoreg.meshing.block import BlockMesh
 from mammoreg.metrics.elongation import Direction, extents_mm
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
-from stages.evaluate.record import Row
 from stages.pose.record import FINE_RAYS, PoseRecord
 
 _METHODS = ("scaling", "plate", "updated")
 
 
-def elongation_rows(pose: PoseRecord, block: BlockMesh, methods: Mapping[str, MethodView]) -> list[Row]:
+def elongation_rows(pose: PoseRecord, block: BlockMesh, methods: Mapping[str, MethodView]) -> list[dict[str, Any]]:
     """Extents of each method's silhouette less those of the undeformed breast, and the mammogram's less the same.
 
     All are measured on the rays on which the mammogram's outline is skin, and divided by the magnification at the

@@ -1,5 +1,10 @@
-"""What each table of the cohort holds (contract, "What comes out")."""
+"""What stage `tables` leaves: the cohort's tables with their columns, statistics, findings and failures."""
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from stages.engine.artefact import Fields, Value
+from stages.engine.record import Record
 from stages.formats.table import Table
 
 _OVERLAP = {"overlap_percent": 1, "dice": 3, "size_ratio": 2}
@@ -109,3 +114,38 @@ FAILURES = ("case", "view", "stage", "status", "message")
 
 CSV_FILES = (*(f"{table.name}.csv" for table in TABLES), "summary.csv", "findings.csv", "failures.csv")
 """What stage `tables` writes beside `cohort.nc` and the readable forms."""
+
+
+def tables_fields(
+    files: Mapping[str, bytes],
+    statistics: Sequence[Mapping[str, Any]],
+    findings: Sequence[Sequence[str]],
+    failures: Sequence[str],
+) -> Fields:
+    """The artefact's contents: files by name, rows of `summary.csv` and `findings.csv`, and failures in words."""
+    values: dict[str, Value] = {
+        "statistics": [dict(row) for row in statistics],
+        "findings": [list(row) for row in findings],
+        "failures": list(failures),
+    }
+    return Fields(files=files, values=values)
+
+
+class TablesRecord(Record):
+    """What the report shows of the tables."""
+
+    @property
+    def statistics(self) -> list[Mapping[str, Any]]:
+        """Rows of `summary.csv`."""
+        return list(self.artefact.value("statistics"))
+
+    @property
+    def findings(self) -> list[list[str]]:
+        """Rows of `findings.csv`: the paper's statements, held or not."""
+        return list(self.artefact.value("findings"))
+
+
+def reduction_text(row: Mapping[str, str], prefix: str = "") -> str:
+    """By how much a mean lies below that of `rigid`, in percent, with how many of all were compared."""
+    percent, compared, of = (row[f"{prefix}{name}"] for name in ("reduction_percent", "compared", "of"))
+    return f"{percent} ({compared} of {of})" if percent else ""
