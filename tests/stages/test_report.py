@@ -131,7 +131,7 @@ def test_a_cohort_in_which_all_failed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("distances", "text"),
-    [([3.0, 4.0], "3.5 mm"), ([3.0, None], "3.0 mm (1 of 2)"), ([None], "no prediction")],
+    [([3.0, 4.0], "3.5 mm (2 of 2)"), ([3.0, None], "3.0 mm (1 of 2)"), ([None], "no prediction (0 of 1)")],
 )
 def test_mean_text(distances: list[float | None], text: str) -> None:
     assert mean_text(distances) == text

@@ -100,8 +100,8 @@ def _headline(artefacts: Sequence[Artefact]) -> list[tuple[str, str]]:
 def mean_text(distances: Sequence[float | None]) -> str:
     """Mean distance with what it counts, such as `3.2 mm (4 of 5)`."""
     summary = summarise(distances)
-    count = f" ({summary.n} of {summary.of})" if summary.n < summary.of else ""
-    return "no prediction" if summary.mean_mm is None else f"{summary.mean_mm:.1f} mm{count}"
+    count = f"{summary.n} of {summary.of}"
+    return f"no prediction ({count})" if summary.mean_mm is None else f"{summary.mean_mm:.1f} mm ({count})"
 
 
 def _pictures(figures: FiguresRecord) -> list[ReportPicture]:

@@ -47,8 +47,8 @@ def cards(statistics: Statistics, done: int, of: int) -> list[Card]:
     for row in statistics:
         if row["method"] == SHOWN_METHOD and row["mean_mm"] and "one view" not in row["group"]:
             paper = f"paper: {row['paper_mean_mm']} mm" if row["paper_mean_mm"] else ""
-            count = "" if row["n"] == row["of"] else f"{row['n']} of {row['of']} "
-            found.append(Card(f"{float(row['mean_mm']):.1f} mm", f"{count}{row['group']}, mean", paper))
+            count = f"{row['n']} of {row['of']}"
+            found.append(Card(f"{float(row['mean_mm']):.1f} mm", f"{count} {row['group']}, mean", paper))
     return found
 
 
