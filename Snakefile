@@ -9,8 +9,7 @@ configfile: f"{workflow.basedir}/config/config.yaml"
 
 include: "workflow/rules/common.smk"
 include: "workflow/rules/digital.smk"
-include: "workflow/rules/case.smk"
-include: "workflow/rules/cohort.smk"
+include: "workflow/rules/stages.smk"
 include: "workflow/rules/studies.smk"
 
 

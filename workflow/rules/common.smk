@@ -101,7 +101,8 @@ def case_row(case):
 
 def artefacts_of(stage, case=None, view=None):
     """Artefacts of a stage: of one view, of all views of a case, or of all cases."""
-    cases = COHORT.cases if case is None else [case]
+    everyone = volunteers() if stage == "volunteer" else COHORT.cases
+    cases = everyone if case is None else [case]
     if scope(stage) == "cohort":
         return [named(stage)]
     if scope(stage) == "case":
@@ -164,11 +165,6 @@ def settings_of(stage):
     return stage_settings(CONFIG, stage)
 
 
-def table_files():
-    """What rule `tables` leaves beside its artefact; the readable forms of each table come with it."""
-    return [str(RESULTS / "tables" / name) for name in ("cohort.nc", *CSV_FILES)]
-
-
 def volunteers():
     """Cases with landmarks in two MR volumes."""
     known = ("mr_compressed", "mr_landmarks", "mr_compressed_landmarks")
@@ -188,3 +184,73 @@ def stability_mesh():
 
 def complete_file():
     return str(RESULTS / "tables" / "complete.txt")
+
+
+# The stability study shares out its scenarios by rules of its own.
+PLAIN_STUDIES = [name for name in STUDIES if not name.startswith("stability")]
+
+# By stage: memory in MB that its job asks for at least, and minutes.
+NEEDS = {
+    "segment": (900, 5),
+    "mesh": (700, 5),
+    "pose": (1200, 10),
+    "compress": (1200, 10),
+    "shape": (900, 5),
+    "solve": (1200, 10),
+    "project": (1200, 10),
+    "localize": (1000, 10),
+    "evaluate": (1000, 10),
+    "figures": (1200, 10),
+    "calibrate": (700, 5),
+    "tables": (1000, 10),
+    "report": (1000, 10),
+    "runtime": (1500, 60),
+    "error_vs_runtime": (1000, 10),
+    "table_1": (700, 20),
+    "volunteer": (1200, 30),
+    "paper_tables": (700, 10),
+    "stability_scan_mesh": (1500, 10),
+    "stability_batch": (1500, 120),
+    "stability": (1000, 10),
+}
+
+
+def memory_of(stage):
+    """Resource function: more where files are large, and with each attempt."""
+    least, _ = NEEDS[stage]
+
+    def memory(wildcards, input, attempt):
+        return max(least, 400 + 12 * int(input.size_mb)) * attempt
+
+    return memory
+
+
+def minutes_of(stage):
+    return NEEDS[stage][1]
+
+
+def message_of(stage):
+    subject = {
+        "view": "{wildcards.case} {wildcards.view}",
+        "case": "{wildcards.case}",
+        "cohort": "cohort",
+    }
+    return f"{subject[scope(stage)]}: {stage}"
+
+
+def beside(stage):
+    """Files that a stage leaves beside its artefact and that a user asks for by name."""
+    tables = {
+        "tables": ("cohort.nc", *CSV_FILES),
+        "error_vs_runtime": ("error_vs_runtime.csv",),
+        "table_1": [f"table_1_forces.{form}" for form in ("csv", "md", "html")],
+        "paper_tables": (
+            "table_2_materials.csv",
+            "table_3_boundary.csv",
+            "table_4_skin.csv",
+            "findings_tables_2_to_4.csv",
+        ),
+        "stability": ("stability.csv",),
+    }
+    pages = [str(RESULTS / "report.html")] if stage == "report" else []
+    return pages + [str(RESULTS / "tables" / name) for name in tables.get(stage, ())]
