@@ -240,7 +240,7 @@ def _between_plates(
     drawn = drawn_surface(mesh, prepared.closing, closed, floating, seen.view.outline, ratio, ShapeOptions())
     state = drawn.closed.state
     plates = plates_around(mesh, prepared.breast, prepared.closing, closed.gap_mm, closed.state.height, state.memory)
-    solved = solve_interior(prepared.breast, plates, drawn.nodes, drawn.closed.deformed, state.pressure)
+    solved = solve_interior(prepared.breast, plates, drawn.nodes, drawn.surface, drawn.closed.deformed, state.pressure)
     return np.asarray(solved.deformed + np.array([0.0, 0.0, view.height_mm - closed.height_mm]))
 
 

@@ -7,10 +7,11 @@ from mammoreg.errors import NotConvergedError
 from mammoreg.fem.plates.closing import Closing
 from mammoreg.geometry.frames import plate_rotation
 from mammoreg.meshing.block import BlockMesh
+from mammoreg.pose import start
 from mammoreg.pose.thickness import ThicknessEstimate
 from stages.engine.artefact import write_artefact
 from stages.mesh.record import mesh_fields
-from stages.pose import start
+from stages.pose.stage import THICKNESS_AT_BOUND
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MIDDLE, ROW, pressed, run, write_mammogram, write_start
 from tests.stages.synthetic_case import header
 
@@ -65,7 +66,7 @@ def test_missing_thickness_is_estimated_and_marked(inputs, tmp_path):
     assert got.ok, got.message
     assert "thickness_mm" in got.value("estimated")
     assert got.value("thickness_mm") == pytest.approx(GAP, rel=0.2)
-    assert start.THICKNESS_AT_BOUND not in got.value("flags")
+    assert THICKNESS_AT_BOUND not in got.value("flags")
 
 
 def test_estimated_thickness_at_the_bound_of_its_search_is_flagged(inputs, tmp_path, monkeypatch):
@@ -73,7 +74,7 @@ def test_estimated_thickness_at_the_bound_of_its_search_is_flagged(inputs, tmp_p
     row = {name: text for name, text in ROW.items() if name != "thickness_mm"}
     got = run("pose", tmp_path, inputs, {"angle_step_deg": 0.0}, row=row)
     assert got.value("thickness_mm") == GAP
-    assert start.THICKNESS_AT_BOUND in got.value("flags")
+    assert THICKNESS_AT_BOUND in got.value("flags")
 
 
 def test_thickness_larger_than_the_breast_fails_and_says_what_to_do(inputs, tmp_path):

@@ -35,6 +35,7 @@ def solve_interior(
     breast: PlacedBreast,
     plates: StandingPlates,
     nodes: NDArray[np.int64],
+    surface: Points,
     start: Points,
     pressure: Floats,
     newton: NewtonOptions | None = None,
@@ -45,7 +46,8 @@ def solve_interior(
         breast: as it was before the plates closed.
         plates: between which it lies.
         nodes: numbers (B,) of the prescribed nodes.
-        start: all nodes (N, 3) as the surface was estimated, in the frame of the breast, mm; those of `nodes` stay.
+        surface: their places (B, 3), in the frame of the breast, mm.
+        start: all nodes (N, 3) as the surface was estimated, in that frame.
         pressure: element pressures (E,) there, kPa.
         newton: when the interior is in equilibrium.
 
@@ -55,7 +57,7 @@ def solve_interior(
     return solve_prescribed(
         breast.model,
         nodes,
-        start[nodes],
+        surface,
         breast.back,
         start=start,
         pressure=pressure,

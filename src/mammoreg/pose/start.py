@@ -15,7 +15,7 @@ from mammoreg.pose.outlined import OutlinedView
 from mammoreg.pose.scaling import fit_scaling
 from mammoreg.pose.thickness import ThicknessEstimate, estimate_thickness
 
-EDGE_QUANTILE = 0.25  # a plate's edge reaches in front of most, not all, of the breast's back
+EDGE_QUANTILE = 0.25  # chosen: a plate's edge reaches in front of most, not all, of the breast's back
 
 
 @dataclass(frozen=True)

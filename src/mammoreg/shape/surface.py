@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.geometry import ViewGeometry
+from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.outline import RadialOutline
@@ -48,6 +49,11 @@ class DrawnSurface:
     closed: Closed
     estimate: ShapeEstimate | None = None
     contact_drift_mm: float = 0.0
+
+    @property
+    def surface(self) -> Points:
+        """Places (B, 3) of the nodes, in the frame of the closing, mm."""
+        return np.asarray(self.closed.deformed[self.nodes])
 
 
 def drawn_surface(

@@ -3,13 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.meshing.fractions import tissue_fraction
+from mammoreg.meshing.fractions import gland_fraction
 from stages.engine.contract import Inputs
 from stages.engine.errors import UserError
 from stages.mesh.record import MeshRecord
 from stages.segment.record import SegmentRecord
-
-_FAT, _GLAND, _SKIN = 1, 2, 3
 
 
 def gland_share(inputs: Inputs) -> NDArray[np.float64]:
@@ -21,4 +19,4 @@ def gland_share(inputs: Inputs) -> NDArray[np.float64]:
     if not inputs.has("segment"):
         raise UserError("a material that tells gland from fat needs the input segment; give it with --in segment=path")
     labels = SegmentRecord(inputs.artefact("segment")).labels
-    return tissue_fraction(MeshRecord(inputs.artefact("mesh")).block, labels, _GLAND, (_FAT, _GLAND, _SKIN))
+    return gland_fraction(MeshRecord(inputs.artefact("mesh")).block, labels)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.breast.compression import Compression
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.breast.placed import PlacedBreast, closing_plates, place_breast
 from mammoreg.contact.soft import SoftMemory
@@ -66,22 +67,19 @@ class CompressFields:
 
     Attributes:
         closed: the breast between the plates, in the floating frame.
-        closing: the plates.
-        breast: what they closed on.
+        prepared: the breast and the plates before they closed.
         view: of the pose, whose plates the result is lifted to.
         mesh: undeformed.
-        mechanics, mu_kpa, gland, compression: with which the breast was placed.
+        mechanics, mu_kpa, gland: with which the breast was placed.
     """
 
     closed: Closed
-    closing: Closing
-    breast: PlacedBreast
+    prepared: Compression
     view: ViewGeometry
     mesh: MeshRecord
     mechanics: Mechanics
     mu_kpa: float
     gland: NDArray[np.float64] | None
-    compression: float
 
     def fields(self) -> Fields:
         """The artefact's contents."""
@@ -105,13 +103,13 @@ class CompressFields:
         return {
             "height_mm": self.view.height_mm,
             "lift_mm": frame.lift_mm,
-            "known_lower_mm": self.closing.lower_mm,
+            "known_lower_mm": self.prepared.closing.lower_mm,
             "raised_mm": self.closed.state.height,
-            "uncompressed_mm": self.closing.uncompressed_mm,
-            "compression": self.compression,
-            "stiffness_ratio": self.breast.stiffness_ratio,
+            "uncompressed_mm": self.prepared.closing.uncompressed_mm,
+            "compression": self.prepared.share,
+            "stiffness_ratio": self.prepared.breast.stiffness_ratio,
             "mechanics": self.mechanics.plain(),
-            "options": asdict(self.closing.options),
+            "options": asdict(self.prepared.closing.options),
             "mu_kpa": self.mu_kpa,
             "angle_deg": self.view.angle_deg,
             "edge_p_mm": self.view.edge_p_mm,

@@ -5,13 +5,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from mammoreg.breast.mechanics import BreastMechanics
-from mammoreg.breast.placed import closing_plates, place_breast
-from mammoreg.contact.soft import touching
+from mammoreg.breast.compression import prepare_compression
 from mammoreg.errors import DataError
 from mammoreg.fem.plates.closing import ClosingOptions
-from mammoreg.geometry import ViewGeometry, breast_to_plate
-from mammoreg.meshing.block import BlockMesh
 from stages.calibrate.record import CalibrateRecord
 from stages.compress.gland_map import gland_share
 from stages.compress.record import CompressFields, seconds_text
@@ -43,27 +39,19 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     view, mechanics = pose.geometry, settings.mechanics.numerics()
     mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
     gland = gland_share(inputs) if mechanics.tells_gland_from_fat else None
-    compression = _compression(mesh.block, view, mechanics)
-    breast = place_breast(mesh.block, view.angle_deg, mechanics, mu_kpa, gland, compression)
     options = replace(
         ClosingOptions(),
         steps=settings.load_steps,
         tolerance_mm=settings.tolerance_mm,
-        penalty_per_mm=settings.penalty_per_mm * breast.stiffness_ratio,
+        penalty_per_mm=settings.penalty_per_mm,
     )
     lower_mm = view.height_mm if pose.plates_known else None
-    closing = closing_plates(breast, view.edge_p_mm, mechanics, options, lower_mm)
+    prepared = prepare_compression(mesh.block, view, mechanics, mu_kpa, gland, options, lower_mm)
     by_force = settings.stop == "force"
+    closing = prepared.closing
     closed = closing.close_to_force(_force_n(pose)) if by_force else closing.close(view.thickness_mm)
     print(seconds_text(closed.report), flush=True)
-    return CompressFields(closed, closing, breast, view, mesh, settings.mechanics, mu_kpa, gland, compression).fields()
-
-
-def _compression(mesh: BlockMesh, view: ViewGeometry, mechanics: BreastMechanics) -> float:
-    """Share of the thickness between the plates that they take away."""
-    skin = breast_to_plate(mesh.points[mesh.skin_nodes()], view.angle_deg)
-    low, high = touching(skin, view.edge_p_mm if mechanics.plates_end else None, mechanics.lip_radius_mm)
-    return max(0.0, 1.0 - view.thickness_mm / (high - low))
+    return CompressFields(closed, prepared, view, mesh, settings.mechanics, mu_kpa, gland).fields()
 
 
 def _force_n(pose: PoseRecord) -> float:

@@ -13,13 +13,12 @@ from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.pose.outline import RadialOutline, radial_outline
+from mammoreg.pose.outlined import OUTLINE_RAYS
 from mammoreg.pose.silhouette import pixels_at_detector, ray_angles
 from stages.engine.artefact import Array, Fields, Value
 from stages.engine.record import Record
 from stages.views import SECOND_VOLUME
 
-OUTLINE_RAYS = 181
-"""Rays on which a model is brought onto an outline."""
 FINE_RAYS = 721
 """Rays on which results are measured and drawn."""
 

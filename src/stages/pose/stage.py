@@ -7,22 +7,23 @@ from mammoreg.errors import NotConvergedError
 from mammoreg.geometry import ViewGeometry
 from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
-from mammoreg.meshing.skin import skin_facets
-from mammoreg.pose.estimate import PoseEstimate, estimate_pose
+from mammoreg.pose.dense_tissue import dense_tissue
+from mammoreg.pose.estimate import PoseEstimate
+from mammoreg.pose.outlined import OutlinedView
+from mammoreg.pose.search import FoundPose, PoseSearch, find_pose
 from stages.calibrate.record import CalibrateRecord
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.mechanics import Mechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.affine import affine_maps, rigid_geometry
-from stages.pose.coarse import coarse_compression
-from stages.pose.dense_tissue import coarse_tissue
 from stages.pose.record import PoseFields
-from stages.pose.start import start_view, without_image
 from stages.pose.view_facts import ViewFacts, facts_of_mammogram, facts_of_second_volume
+from stages.pose.without_image import without_image
 from stages.segment.record import SegmentRecord
 
 ANGLE_AT_BOUND = "angle at its bound"
 ANGLE_FROM_HEADER = "angle not determined by the image"
+THICKNESS_AT_BOUND = "estimated thickness at the bound of its search"
 NOT_DRAWN = "breast not drawn to the second volume's outline, for the coarse compression did not converge"
 
 
@@ -53,70 +54,63 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     else:
         return without_image(mesh, subject)
     mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
-    compress = coarse_compression(mesh, settings.mechanics.numerics(), mu_kpa, plates_known=facts.placed)
-    start, estimated, doubts = start_view(facts, mesh, compress)
-    tissue = coarse_tissue(segment, mesh) if settings.use_density and not facts.placed else None
-    found = estimate_pose(
-        start,
-        facts.outline,
-        compress,
-        skin_facets(mesh.skin_quads(), len(mesh.points), 2),
-        0.0 if facts.placed else settings.angle_step_deg,
-        settings.angle_bound_deg,
-        settings.angle_sd_deg,
-        tissue,
-        facts.density,
-    )
-    if found is None and facts.placed:
-        return _fields(facts, mesh, segment.nipple, start, None, estimated, (NOT_DRAWN,))
-    if found is None:
+    tissue = dense_tissue(segment.labels, segment.breast_mask, mesh) if settings.use_density else None
+    search = PoseSearch(settings.angle_step_deg, settings.angle_bound_deg, settings.angle_sd_deg)
+    found = find_pose(facts.seen, mesh, settings.mechanics.numerics(), mu_kpa, tissue, search)
+    return _fields(facts, mesh, segment.nipple, found)
+
+
+def _doubts(facts: ViewFacts, found: FoundPose) -> tuple[str, ...]:
+    """What speaks against the pose, in words.
+
+    Raises:
+        NotConvergedError: there is no pose, and no second volume that stands for one.
+    """
+    if facts.seen.placed:
+        return (NOT_DRAWN,) if found.estimate is None else ()
+    if found.estimate is None:
         raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
-    flags = () if facts.placed else (*doubts, *_angle_flags(found))
-    return _fields(facts, mesh, segment.nipple, start, found, estimated, flags)
-
-
-def _angle_flags(found: PoseEstimate) -> tuple[str, ...]:
-    doubts = ((ANGLE_AT_BOUND, found.at_bound), (ANGLE_FROM_HEADER, not found.determined))
+    thickness = found.start.thickness
+    doubts = (
+        (THICKNESS_AT_BOUND, thickness is not None and thickness.at_bound),
+        (ANGLE_AT_BOUND, found.estimate.at_bound),
+        (ANGLE_FROM_HEADER, not found.estimate.determined),
+    )
     return tuple(text for text, holds in doubts if holds)
 
 
-def _fields(
-    facts: ViewFacts,
-    mesh: BlockMesh,
-    nipple: Points,
-    start: ViewGeometry,
-    found: PoseEstimate | None,
-    estimated: tuple[str, ...],
-    flags: tuple[str, ...],
-) -> Fields:
+def _fields(facts: ViewFacts, mesh: BlockMesh, nipple: Points, found: FoundPose) -> Fields:
     """What the artefact keeps; without an estimate the view stays where it started."""
-    view = start if found is None else found.view
+    doubts = _doubts(facts, found)
+    start, estimate, seen = found.start.view, found.estimate, facts.seen
+    view = start if estimate is None else estimate.view
+    guessed = ("thickness_mm",) if found.start.thickness is not None else ()
     return PoseFields(
         view=view,
-        rigid=rigid_geometry(mesh, start, facts, nipple),
-        maps=affine_maps(mesh, start, view, facts),
+        rigid=rigid_geometry(mesh, start, seen, nipple),
+        maps=affine_maps(mesh, start, view, seen),
         outline=facts.image,
         mammogram=facts.mammogram,
         tissue=facts.tissue,
         storage=facts.storage,
-        plates_known=facts.placed,
-        drawn_mm=_drawn_mm(facts, view),
-        estimated=estimated,
-        flags=(*facts.flags, *flags),
+        plates_known=seen.placed,
+        drawn_mm=_drawn_mm(seen, view),
+        estimated=tuple(dict.fromkeys((*facts.estimated, *guessed))),
+        flags=(*facts.flags, *doubts),
         values={
             **facts.values,
-            "header_angle_deg": facts.geometry.angle_deg,
-            "angle_determined": facts.placed or (found is not None and found.determined),
-            **({} if found is None else _search_values(found)),
+            "header_angle_deg": seen.geometry.angle_deg,
+            "angle_determined": seen.placed or (estimate is not None and estimate.determined),
+            **({} if estimate is None else _search_values(estimate)),
         },
     ).fields()
 
 
-def _drawn_mm(facts: ViewFacts, view: ViewGeometry) -> tuple[float, ...] | None:
+def _drawn_mm(seen: OutlinedView, view: ViewGeometry) -> tuple[float, ...] | None:
     """How far the breast was drawn over the plates: from the model's to the second volume's place, plate axes."""
-    if not facts.placed:
+    if not seen.placed:
         return None
-    return facts.geometry.middle_mm - view.middle_mm, facts.geometry.edge_p_mm - view.edge_p_mm, 0.0
+    return seen.geometry.middle_mm - view.middle_mm, seen.geometry.edge_p_mm - view.edge_p_mm, 0.0
 
 
 def _search_values(found: PoseEstimate) -> dict[str, Value]:

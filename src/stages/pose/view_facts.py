@@ -8,18 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
-from mammoreg.geometry import ViewGeometry, Volume
-from mammoreg.imaging.mammogram import MammogramAnalysis, analyse
-from mammoreg.imaging.mammogram_canonical import canonicalise
+from mammoreg.geometry import Volume
+from mammoreg.imaging.acquisition import Mammogram
+from mammoreg.imaging.mammogram import MammogramAnalysis
 from mammoreg.imaging.mammogram_orientation import View
-from mammoreg.pose.density import DensityImage, mammogram_structure
-from mammoreg.pose.outline import RadialOutline, radial_outline
+from mammoreg.pose.outlined import OUTLINE_RAYS, OutlinedView, outlined_mammogram
 from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
-from mammoreg.pose.silhouette import pixels_at_detector, ray_angles
+from mammoreg.pose.silhouette import ray_angles
 from stages.cohort.readers.mammogram import read_mammogram
 from stages.engine.contract import Subject, Value
-from stages.pose.record import OUTLINE_RAYS, ImageOutline, ImageStorage
+from stages.pose.record import ImageOutline, ImageStorage
 
 
 @dataclass(frozen=True)
@@ -27,11 +26,7 @@ class ViewFacts:
     """A view before its pose is known.
 
     Attributes:
-        geometry: angle, thickness (nan where unknown), source, detector; of the rest only a second volume knows.
-        outline: on rays, mm at the detector.
-        placed: whether edge, middle and height are known (second volume).
-        density: dense tissue of a mammogram.
-        nipple: (2,) canonical (column, row), or None.
+        seen: what a model is compared with.
         estimated: what neither header nor table gave.
         flags: doubts.
         image: the outline as the image shows it.
@@ -40,12 +35,8 @@ class ViewFacts:
         values: what the artefact takes over besides.
     """
 
-    geometry: ViewGeometry
-    outline: RadialOutline
+    seen: OutlinedView
     image: ImageOutline
-    placed: bool
-    density: DensityImage | None = None
-    nipple: NDArray[np.float64] | None = None
     estimated: tuple[str, ...] = ()
     flags: tuple[str, ...] = ()
     mammogram: NDArray[Any] | None = None
@@ -64,39 +55,24 @@ def facts_of_mammogram(path: Path, subject: Subject, view: View) -> ViewFacts:
     facts = stored.facts
     if facts.pixel_mm is None:
         raise DataError(f"{path.name}: the pixel spacing is unknown; give pixel_spacing_mm in the views table")
-    image = canonicalise(
+    mammogram = Mammogram(
         stored.pixels,
-        subject.laterality,
         view,
-        orientation=facts.orientation,
-        photometric=facts.photometric,
-        linear=facts.linear,
+        facts.pixel_mm,
+        facts.thickness_mm,
+        facts.angle_deg,
+        facts.source_detector_mm,
+        facts.support_detector_mm,
+        facts.orientation,
+        facts.photometric,
+        facts.linear,
     )
-    found = analyse(image.pixels, facts.pixel_mm, view)
+    outlined = outlined_mammogram(mammogram, subject.laterality)
+    image, found = outlined.image, outlined.found
     rows, columns = image.pixels.shape
-    thickness = facts.thickness_mm if facts.thickness_mm is not None else float("nan")
-    geometry = ViewGeometry(
-        angle_deg=facts.angle_deg,
-        edge_p_mm=0.0,
-        middle_mm=0.0,
-        height_mm=0.0,
-        thickness_mm=thickness,
-        source_detector_mm=facts.source_detector_mm,
-        support_detector_mm=facts.support_detector_mm,
-        pixel_mm=facts.pixel_mm,
-        rows=rows,
-        columns=columns,
-    )
-    breast = found.mask if found.pectoral is None else found.mask & ~found.pectoral
     return ViewFacts(
-        geometry=geometry,
-        outline=radial_outline(
-            pixels_at_detector(found.outline, geometry), found.outline_weight, ray_angles(OUTLINE_RAYS)
-        ),
+        seen=outlined.view,
         image=ImageOutline(found.outline, found.outline_weight),
-        placed=False,
-        density=mammogram_structure(image.pixels, breast, facts.pixel_mm),
-        nipple=found.nipple,
         estimated=tuple(dict.fromkeys((*facts.estimated, *image.estimated))),
         flags=(*facts.flags, *image.flags),
         mammogram=image.pixels,
@@ -123,7 +99,7 @@ def facts_of_second_volume(mask: Volume) -> ViewFacts:
     meaning = "outline of the second volume along the compression, (column, row)"
     image = ImageOutline(pixels[known], outline.weight[known], meaning)
     values: dict[str, Value] = {"contact_mm2": list(plates.contact_mm2)}
-    return ViewFacts(geometry, outline, image, placed=True, values=values)
+    return ViewFacts(OutlinedView(geometry, outline, placed=True), image, values=values)
 
 
 def _tissue(found: MammogramAnalysis) -> NDArray[np.uint8]:
