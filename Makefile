@@ -9,15 +9,14 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 .PHONY: help run test verify check bench lock generated
 
 help:
-	@echo "make run    the embedded cohort on all cores, then where report and tables are (CORES=2 for fewer)"
+	@echo "make run    the embedded cohort on all cores, then its results and where things are (CORES=2 for fewer)"
 	@echo "make test   the test suite"
 	@echo "make verify the verification of the finite elements, with what takes minutes"
 	@echo "make check  formatting, lint, types, import boundaries, workflow lint"
 	@echo "make bench  time and memory of the solver, beside peers, and of a two-view case, stage by stage"
 
 run: .venv/runtime
-	$(BIN)/snakemake --cores $(CORES); status=$$?; \
-	echo "report: $(CURDIR)/results/report.html"; echo "tables: $(CURDIR)/results/tables/"; exit $$status
+	$(BIN)/mammoreg run --cores $(CORES)
 
 test: .venv/development
 	$(BIN)/python -m pytest -n auto --dist loadfile
@@ -41,7 +40,7 @@ bench: .venv/runtime
 COMPILE = $(BIN)/pip-compile --quiet --strip-extras --allow-unsafe --generate-hashes --no-annotate --no-header \
 	--no-emit-index-url --no-emit-find-links --no-emit-trusted-host
 lock: .venv/development
-	$(COMPILE) --extra stages --extra workflow --extra install -o requirements.lock pyproject.toml
+	$(COMPILE) --extra install -o requirements.lock pyproject.toml
 	$(COMPILE) --extra dev -c requirements.lock -o requirements-dev.lock pyproject.toml
 
 # What is written from the pydantic models: schemas, config.yaml, the key tables of config/README.md.

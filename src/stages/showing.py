@@ -4,22 +4,28 @@ import json
 from collections.abc import Iterator
 
 from stages.engine.artefact import Artefact
-
-LONGEST = 100
+from stages.engine.text import value_lines
 
 
 def describe(artefact: Artefact) -> str:
-    """Status, settings, arrays, volumes and values of an artefact, one a line."""
+    """How a stage ended, its values (predictions as tables), arrays and volumes, and what made them."""
     attrs = artefact.attrs
-    what = " ".join(part for part in (artefact.case, artefact.view or "", f"({artefact.laterality})") if part)
-    lines = [f"{artefact.stage} of {what}: {artefact.status}"]
+    lines = [f"{artefact.stage} of {_subject(artefact)}: {artefact.status}"]
     lines += [f"  {artefact.message}"] if artefact.message else []
-    lines += [f"package {attrs['package_version']}, schema {attrs['schema']}, code {attrs['code'][:12]}"]
-    lines += ["software " + ", ".join(f"{k} {v}" for k, v in json.loads(attrs.get("software", "{}")).items())]
+    lines += ["values", *value_lines({name: artefact.value(name) for name in artefact.value_names()})]
+    lines += ["arrays", *_arrays(artefact), "volumes", *_volumes(artefact)]
     lines += [f"frame {attrs['frame']}", f"settings {attrs['settings']}", f"row {attrs['row']}"]
     lines += ["inputs " + (", ".join(json.loads(attrs["inputs"])) or "none")]
-    lines += ["arrays", *_arrays(artefact), "volumes", *_volumes(artefact), "values", *_values(artefact)]
+    lines += [f"package {attrs['package_version']}, schema {attrs['schema']}, code {attrs['code'][:12]}"]
+    lines += ["software " + ", ".join(f"{k} {v}" for k, v in json.loads(attrs.get("software", "{}")).items())]
     return "\n".join(lines)
+
+
+def _subject(artefact: Artefact) -> str:
+    """Case, view and side; a cohort has no side."""
+    if artefact.case == "cohort":
+        return "the cohort"
+    return " ".join(part for part in (artefact.case, artefact.view or "", f"({artefact.laterality})") if part)
 
 
 def _arrays(artefact: Artefact) -> Iterator[str]:
@@ -34,12 +40,6 @@ def _volumes(artefact: Artefact) -> Iterator[str]:
         if texts.get("frame"):
             where, units = name.rpartition("/")[0], texts["units"]
             yield f"  {where} {_size(shape)} {units} ({texts['frame']}): {texts['long_name']}"
-
-
-def _values(artefact: Artefact) -> Iterator[str]:
-    for name in artefact.value_names():
-        text = json.dumps(artefact.value(name), ensure_ascii=False)
-        yield f"  {name} = {text if len(text) <= LONGEST else text[:LONGEST] + ' ...'}"
 
 
 def _size(shape: tuple[int, ...]) -> str:

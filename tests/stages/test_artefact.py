@@ -147,14 +147,14 @@ def test_text_array_is_a_mistake_of_the_programmer(tmp_path):
 def test_file_that_is_no_artefact(tmp_path, content):
     path = tmp_path / "x.h5"
     path.write_bytes(content)
-    with pytest.raises(ArtefactError, match="not an artefact of this pipeline; delete it and run again"):
+    with pytest.raises(ArtefactError, match="is no artefact of this pipeline"):
         Artefact(path)
 
 
 def test_other_hdf5_file_is_no_artefact(tmp_path):
     volume = xarray.Dataset({"mr": (("x",), np.ones(3))})
     volume.to_netcdf(tmp_path / "x.h5", engine="netcdf4", group="values")
-    with pytest.raises(ArtefactError, match="not an artefact of this pipeline"):
+    with pytest.raises(ArtefactError, match="is no artefact of this pipeline"):
         Artefact(tmp_path / "x.h5")
 
 

@@ -78,6 +78,23 @@ def test_export_writes_what_other_programs_open(artefact, tmp_path, capsys):
     assert (tmp_path / "out" / "updated.mr.nii").exists()
 
 
+def test_check_recognises_swapped_tables(tmp_path, capsys):
+    folder = write_cohort(tmp_path)
+    assert main(["check", str(folder / "views.tsv"), str(folder / "cases.tsv")]) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 2
+    assert "views.tsv: is given as cases, but is the table of the mammograms; give the table of the breasts" in lines[1]
+
+
+def test_check_warns_of_marks_that_predict_nothing(tmp_path, capsys):
+    folder = write_cohort(tmp_path)
+    assert main(["check", str(folder / "cases.tsv")]) == 0
+    assert (
+        "warning: cases.tsv (c1): has mr_lesion and mr_landmarks but no view, so that nothing is predicted"
+        in capsys.readouterr().out
+    )
+
+
 def test_check_of_a_good_and_a_bad_cohort(tmp_path, capsys):
     folder = write_cohort(tmp_path)
     assert main(["check", str(folder / "cases.tsv"), str(folder / "views.tsv")]) == 0
@@ -93,7 +110,14 @@ def test_check_of_a_good_and_a_bad_cohort(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["show", "no.h5"], "no.h5: not an artefact of this pipeline"),
+        (["show", "no.h5"], "there is no file no.h5"),
+        (["show", "README.md"], "README.md: is no artefact of this pipeline\n"),
+        (["show", "folder"], "folder: is a folder; name one of the .h5 files in it"),
+        (["export", "no.h5", "--to", "out"], "there is no file no.h5"),
+        (
+            ["run", "segment", "--in", "mr=nothere.nii", "--out", "x.h5"],
+            "segment, input mr: there is no file nothere.nii",
+        ),
         (["run", "mash", "--out", "x.h5"], "no stage 'mash'; the stages are digital, segment"),
         (["run", "mesh", "--in", "segment", "--out", "x.h5"], "'segment' is no pair; write name=value"),
         (["run", "mesh", "--settings", "{elements: 7}", "--out", "x.h5"], "--settings is no JSON object"),
@@ -101,7 +125,37 @@ def test_check_of_a_good_and_a_bad_cohort(tmp_path, capsys):
 )
 def test_mistake_is_one_message(arguments, message, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "README.md").write_text("a text of the user's\n")
+    (tmp_path / "folder").mkdir()
     assert main(arguments) == 1
     error = capsys.readouterr().err
     assert message in error
     assert "Traceback" not in error
+    assert "delete" not in error
+
+
+def test_no_command_is_the_help_and_status_2(capsys):
+    assert main([]) == 2
+    assert "show artefacts" in capsys.readouterr().err
+
+
+def test_show_prints_predictions_as_a_table_with_rounded_numbers(tmp_path, capsys):
+    rows = [
+        {"view": "CC", "name": "lesion", "column": -43.6057097, "row": 1234.5678, "message": ""},
+        {"view": "MLO", "name": "a longer name", "column": None, "row": 7.0, "message": "not seen"},
+    ]
+    write_artefact(tmp_path / "localize.h5", ATTRS, Fields(values={"mammogram_rows": rows}))
+    assert main(["show", str(tmp_path / "localize.h5")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    start = lines.index("  mammogram_rows, 2 rows")
+    assert lines[start + 1 : start + 4] == [
+        "    view  name           column   row  message",
+        "    CC    lesion         -43.61  1235  -",
+        "    MLO   a longer name       -     7  not seen",
+    ]
+
+
+def test_show_of_the_cohort_names_no_side(tmp_path, capsys):
+    write_artefact(tmp_path / "calibrate.h5", ATTRS | {"stage": "calibrate", "case": "cohort", "view": ""}, Fields())
+    assert main(["show", str(tmp_path / "calibrate.h5")]) == 0
+    assert capsys.readouterr().out.startswith("calibrate of the cohort: ok\n")

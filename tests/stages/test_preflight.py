@@ -215,3 +215,52 @@ def test_no_patient_in_any_message(folder):
 def test_development_data_pass(name):
     views = DATA / name / "views.tsv"
     assert check_cohort(read_cohort(DATA / name / "cases.tsv", views if views.exists() else None)) == []
+
+
+def _cut(path, share):
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+
+
+@pytest.mark.parametrize("share", [0.5, 0.98])
+def test_compressed_volume_that_ends_early(folder, share):
+    _cut(folder / "mr.nii.gz", share)
+    assert "column mr: " in _faults(folder)[0]
+    assert any("mr.nii.gz: ends early or is damaged" in fault for fault in _faults(folder))
+
+
+def test_damage_inside_a_compressed_volume(folder):
+    content = bytearray((folder / "mr.nii.gz").read_bytes())
+    content[-6] ^= 0xFF  # in the checksum: every voxel is there, but not as it was written
+    (folder / "mr.nii.gz").write_bytes(bytes(content))
+    _assert_only(folder, "column mr: ", "mr.nii.gz: ends early or is damaged")
+
+
+def test_plain_volume_shorter_than_its_header_says(folder):
+    write_volume(folder / "mr.nii")
+    table = folder / "cases.tsv"
+    table.write_text(table.read_text().replace("\tmr.nii.gz", "\tmr.nii"))
+    assert _faults(folder) == []
+    size = (folder / "mr.nii").stat().st_size
+    (folder / "mr.nii").write_bytes((folder / "mr.nii").read_bytes()[:-1])
+    _assert_only(folder, f"mr.nii: holds {size - 1} of the {size} bytes that its header promises")
+
+
+def test_mammogram_with_too_few_pixels(folder):
+    write_dicom(folder / "cc.dcm", PixelData=np.zeros((ROWS - 1, COLUMNS), np.uint16).tobytes())
+    _assert_only(folder, "views.tsv (c1 CC), column image: ", "of the 2400 bytes of its pixels")
+
+
+def test_mammogram_without_pixels(folder):
+    write_dicom(folder / "cc.dcm", PixelData=None)
+    _assert_only(folder, "cc.dcm: holds no pixels")
+
+
+def test_picture_that_ends_early(folder):
+    noise = np.random.default_rng(1).integers(0, 255, (ROWS, COLUMNS), dtype=np.uint8)
+    Image.fromarray(noise).save(folder / "cc.png")
+    view = {"case": "c1", "view": "CC", "image": "cc.png", "pixel_spacing_mm": "0.2", "lesion": "lesion.png"}
+    write_tsv(folder / "views.tsv", view)
+    assert _faults(folder) == []
+    _cut(folder / "cc.png", 0.6)
+    assert any("cc.png: ends early or is damaged" in fault for fault in _faults(folder))

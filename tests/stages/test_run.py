@@ -2,6 +2,8 @@
 
 import json
 import shlex
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -221,6 +223,6 @@ def test_command_line_can_be_pasted():
     subject = Subject("c1", "L", "CC", {"orientation": "A\\R"})
     text = command_line("pose", {"mesh": ["a b.h5"], "image": "x.dcm"}, "out.h5", {"a": 1}, subject)
     words = shlex.split(text)
-    assert words[:5] == ["python", "-m", "stages", "run", "pose"]
+    assert words[:8] == ["cd", str(Path.cwd()), "&&", sys.executable, "-m", "stages", "run", "pose"]
     for pair in (["--view", "CC"], ["--row", "orientation=A\\R"], ["--in", "mesh=a b.h5"], ["--settings", '{"a": 1}']):
         assert pair in [words[i : i + 2] for i in range(len(words))]

@@ -145,6 +145,7 @@ def read_cohort(cases: Path, views: Path | None, files_in: Path | None = None) -
     Raises:
         FaultsError: all that is wrong in them, at once.
     """
+    _check_order(cases, views)
     faults: list[Fault] = []
     case_rows, ids = _read_rows(cases, CaseRow, files_in, faults)
     view_rows = _read_rows(views, ViewRow, files_in, faults)[0] if views else []
@@ -158,6 +159,27 @@ def read_cohort(cases: Path, views: Path | None, files_in: Path | None = None) -
     if faults:
         raise FaultsError(faults)
     return Cohort(cases, views, tuple(row for _, row in case_rows), tuple(row for _, row in view_rows))
+
+
+def _check_order(cases: Path, views: Path | None) -> None:
+    """Tables in each other's place would be a fault a cell; they are told by their columns, and said once."""
+    given = [(cases, "cases"), *([(views, "views")] if views else [])]
+    for path, wanted in given:
+        columns = _columns(path)
+        other, model, mine = ("views", ViewRow, CaseRow) if wanted == "cases" else ("cases", CaseRow, ViewRow)
+        if _required(model) <= columns and not _required(mine) <= columns:
+            meanings = {"cases": "the table of the breasts", "views": "the table of the mammograms"}
+            remedy = "give the table of the breasts first, then that of the mammograms"
+            raise FaultsError([Fault(str(path), f"is given as {wanted}, but is {meanings[other]}", remedy)])
+
+
+def _columns(path: Path) -> set[str]:
+    """The names in a table's first line; none where it cannot be read, which is told later."""
+    try:
+        with path.open(encoding="utf-8-sig") as file:
+            return {name.strip() for name in file.readline().split("\t")}
+    except (OSError, UnicodeDecodeError):
+        return set()
 
 
 AnyRow = TypeVar("AnyRow", bound=Row)

@@ -12,6 +12,7 @@ from stages.cohort.cases import CaseRow, Cohort, ViewRow
 from stages.cohort.readers.mammogram import is_picture, read_mammogram_facts
 from stages.cohort.readers.mr_header import is_nifti, read_mr_grid
 from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
+from stages.cohort.readers.whole import check_whole_dicom, check_whole_mr, check_whole_picture
 from stages.engine.errors import Fault
 
 LABELS = range(5)
@@ -34,6 +35,17 @@ def check_cohort(cohort: Cohort, made: Collection[Path] = ()) -> list[Fault]:
     return faults
 
 
+def warnings_of(cohort: Cohort) -> list[str]:
+    """What is no fault but looks like something forgotten, a line each."""
+    return [
+        f"{cohort.cases_file.name} ({case.case}): has {' and '.join(marks)} but no view, so that nothing is predicted; "
+        "add its mammograms to the table of views"
+        for case in cohort.cases.values()
+        if not cohort.views(case.case)
+        and (marks := [c for c in ("mr_lesion", "mr_landmarks") if getattr(case, c) is not None])
+    ]
+
+
 class _Checked:
     """The files of one row that are there, and the checks of their contents."""
 
@@ -45,7 +57,7 @@ class _Checked:
     def case_faults(self, case: CaseRow) -> Iterator[Fault]:
         yield from self._missing_faults()
         for column in ("mr", "mr_compressed"):
-            yield from self._fault(column, read_mr_grid)
+            yield from self._fault(column, _check_mr)
         yield from self._fault("mr_lesion", lambda path: _check_mr_lesion(path, self.files.get("mr")))
         yield from self._fault("mr_labels", lambda path: _check_labels(path, self.files.get("mr")))
         for column in ("mr_landmarks", "mr_surface_points"):
@@ -74,6 +86,11 @@ class _Checked:
             check(self.files[column])
         except DataError as error:
             yield Fault(f"{self.where}, column {column}", str(error))
+
+
+def _check_mr(path: Path) -> None:
+    read_mr_grid(path)
+    check_whole_mr(path)
 
 
 def _check_mr_lesion(path: Path, mr: Path | None) -> None:
@@ -134,6 +151,7 @@ def _check_image(path: Path, view: ViewRow, laterality: Any) -> None:
     if facts.pixel_mm is None:
         raise DataError(f"{path}: neither header nor table gives the pixel spacing; fill the column pixel_spacing_mm")
     _image_size(path)
+    (check_whole_picture if is_picture(path) else check_whole_dicom)(path)
 
 
 def _check_view_lesion(path: Path, image: Path | None) -> None:

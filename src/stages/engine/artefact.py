@@ -87,6 +87,10 @@ class Artefact:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        if path.is_dir():
+            raise ArtefactError(f"{path}: is a folder; name one of the .h5 files in it")
+        if not path.exists():
+            raise ArtefactError(f"there is no file {path}")
         try:
             with h5py.File(path, "r", locking=False) as file:
                 self.attrs: dict[str, str] = {name: _text(value) for name, value in file.attrs.items()}
@@ -96,7 +100,7 @@ class Artefact:
             self.laterality = cast(Literal["L", "R"], self.attrs["laterality"])
             self.failure = _failure(self.attrs)
         except (OSError, KeyError, ValueError) as error:
-            raise ArtefactError(f"{path}: not an artefact of this pipeline; delete it and run again") from error
+            raise ArtefactError(f"{path}: is no artefact of this pipeline") from error
 
     @property
     def ok(self) -> bool:

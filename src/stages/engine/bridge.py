@@ -1,6 +1,5 @@
 """What a rule of the workflow calls: its log, the stage, and a line on the terminal when a case is done."""
 
-import logging
 import os
 import sys
 import traceback
@@ -10,9 +9,11 @@ from pathlib import Path
 from typing import Any, Protocol, TextIO
 
 from stages.engine.errors import UserError
+from stages.engine.outcome import BUG, INTERRUPTED, note_outcome
 from stages.engine.threads import compute_with_one_thread
 
 LAST_OF_A_CASE = "figures"
+_CLEAR_LINE = "\r\033[2K"
 
 
 class Job(Protocol):
@@ -31,19 +32,21 @@ def run_job(job: Job) -> None:
     compute_with_one_thread()
     from stages.engine.contract import Subject
     from stages.engine.run import command_line, run_stage
+    from stages.engine.stage_log import log_to
 
     stage = str(job.params.get("stage", job.rule))
     inputs, output, settings = _inputs(job), Path(job.output[0]), dict(job.params.settings)
     subject = Subject(**job.params.subject)
 
     def work(terminal: TextIO) -> None:
+        log_to(sys.stdout)
         print(command_line(stage, inputs, output, settings, subject), flush=True)
         fields = run_stage(stage, inputs, output, settings, subject)
         if fields.failure and (fields.failure.stage, fields.failure.view) == (stage, subject.view or ""):
             where = f"{subject.case} {subject.view}" if subject.view else subject.case
-            print(f"{where} {fields.status}: {fields.message}", file=terminal, flush=True)
+            tell(terminal, f"{where} {fields.status}: {fields.message}")
         if stage == LAST_OF_A_CASE:
-            print(_progress(subject.case, fields.status, output, job.config["case_count"]), file=terminal, flush=True)
+            tell(terminal, _progress(subject.case, fields.status, output, job.config["case_count"]))
 
     _logged(job, work)
 
@@ -59,7 +62,7 @@ def run_complete(job: Job) -> None:
 
     def work(terminal: TextIO) -> None:
         write_completion([Path(path) for path in job.input.cases], Path(job.output[0]))
-        print("all cases complete", file=terminal, flush=True)
+        tell(terminal, "all cases complete")
 
     _logged(job, work)
 
@@ -81,16 +84,22 @@ def _inputs(job: Job) -> Mapping[str, Path | list[Path]]:
 
 def _logged(job: Job, work: Callable[[TextIO], None]) -> None:
     with _output_to(Path(job.log[0])) as terminal:
-        # No clock: a log of the same job is the same. Tracebacks of bad data come at the level INFO.
-        logging.basicConfig(stream=sys.stderr, format="%(message)s")
-        logging.getLogger("stages").setLevel(logging.INFO)
         try:
             work(terminal)
+        except KeyboardInterrupt:
+            sys.exit(INTERRUPTED)
         except Exception as error:
             traceback.print_exc()
-            name = f"{job.rule}: " if isinstance(error, UserError) else f"{job.rule} stopped by a bug: "
-            print(f"{name}{error}\nlog: {job.log[0]}", file=terminal, flush=True)
+            note_outcome(error.outcome if isinstance(error, UserError) else BUG)
+            by_bug = "" if isinstance(error, UserError) else " stopped by a bug"
+            tell(terminal, f"{job.rule}{by_bug}: {error}")
             sys.exit(1)
+
+
+def tell(terminal: TextIO, text: str) -> None:
+    """Write to the terminal in one piece; where it shows a bar, in the bar's place, which is drawn again below."""
+    terminal.write(f"{_CLEAR_LINE if terminal.isatty() else ''}{text}\n")
+    terminal.flush()
 
 
 @contextmanager

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from stages.engine.artefact import Artefact
-from stages.engine.errors import UserError
+from stages.engine.errors import CasesFailedError
 from stages.engine.failures import Failure
 from stages.engine.writing import write_bytes
 
@@ -25,7 +25,7 @@ def write_completion(artefacts: Sequence[Path], output: Path) -> None:
         output: the file.
 
     Raises:
-        UserError: a case failed; each is named with its message.
+        CasesFailedError: a case failed; each is named with its message.
     """
     opened = [Artefact(path) for path in artefacts]
     cases = sorted({artefact.case for artefact in opened})
@@ -35,5 +35,5 @@ def write_completion(artefacts: Sequence[Path], output: Path) -> None:
         lines = [f"  {case}{f' {failure.view}' if failure.view else ''}: {failure}" for case, failure in failures]
         head = f"{count} of {len(cases)} cases did not finish; the tables are written and name them:"
         bugs = any(failure.status == "bug" for _, failure in failures)
-        raise UserError("\n".join([head, *lines, _REMEDY, *([_BUG_REMEDY] if bugs else [])]))
+        raise CasesFailedError("\n".join([head, *lines, _REMEDY, *([_BUG_REMEDY] if bugs else [])]), by_bug=bugs)
     write_bytes(output, "".join(f"{case}\tok\n" for case in cases).encode())

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from stages.engine.outcome import BUG, CASES_FAILED, MISTAKE
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -23,7 +25,21 @@ class Fault:
 
 
 class UserError(Exception):
-    """A mistake in what the user handed in; the message is meant to be read without a traceback."""
+    """A mistake in what the user handed in; the message is meant to be read without a traceback.
+
+    Attributes:
+        outcome: exit status of the run that it ends.
+    """
+
+    outcome = MISTAKE
+
+
+class CasesFailedError(UserError):
+    """Some case failed; the others and the tables are there."""
+
+    def __init__(self, message: str, *, by_bug: bool) -> None:
+        super().__init__(message)
+        self.outcome = BUG if by_bug else CASES_FAILED
 
 
 class FaultsError(UserError):

@@ -5,6 +5,8 @@ import json
 import logging
 import platform
 import shlex
+import sys
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
@@ -18,6 +20,7 @@ from stages.engine.contract import Inputs, Stage, Subject
 from stages.engine.errors import UserError
 from stages.engine.failures import Failure, failure_of
 from stages.engine.registry import STAGE_MODULES, load_stage, runs_for_one_case, stage_digest
+from stages.engine.stage_log import log_fields
 from stages.engine.writing import write_bytes
 
 _LOG = logging.getLogger(__name__)
@@ -49,9 +52,11 @@ def execute(
     stage: Stage, code: str, inputs: InputPaths, output: Path, settings: Mapping[str, Any], subject: Subject
 ) -> Fields:
     """As `run_stage`, for a stage record and the digest of its code."""
+    start = time.perf_counter()
     model = validated(stage, settings)
     opened, ids = _open(stage, inputs)
     fields = _outcome(stage, opened, model, subject)
+    log_fields(stage.name, fields, time.perf_counter() - start)
     for name, content in fields.files.items():
         write_bytes(output.parent / (stage.folder or stage.name) / name, content)
     write_artefact(output, _header(stage, code, ids, model, subject), fields)
@@ -72,8 +77,8 @@ def validated(stage: Stage, settings: Mapping[str, Any]) -> BaseModel:
 
 
 def command_line(name: str, inputs: InputPaths, output: Path, settings: Mapping[str, Any], subject: Subject) -> str:
-    """The shell command that runs the same stage by hand."""
-    words = ["python", "-m", "stages", "run", name, "--case", subject.case, "--laterality", subject.laterality]
+    """The shell command that runs the same stage by hand, from whatever folder it is pasted in."""
+    words = [sys.executable, "-m", "stages", "run", name, "--case", subject.case, "--laterality", subject.laterality]
     if subject.view:
         words += ["--view", subject.view]
     for key, text in subject.row.items():
@@ -83,7 +88,7 @@ def command_line(name: str, inputs: InputPaths, output: Path, settings: Mapping[
             words += ["--in", f"{key}={path}"]
     if settings:
         words += ["--settings", json.dumps(settings)]
-    return shlex.join([*words, "--out", str(output)])
+    return f"cd {shlex.quote(str(Path.cwd()))} && {shlex.join([*words, '--out', str(output)])}"
 
 
 def _open(stage: Stage, inputs: InputPaths) -> tuple[Inputs, dict[str, list[str]]]:
@@ -93,6 +98,9 @@ def _open(stage: Stage, inputs: InputPaths) -> tuple[Inputs, dict[str, list[str]
         raise UserError(f"{stage.name} takes no input {', '.join(unknown)}; it takes {', '.join(sorted(known))}")
     if missing := [name for name in stage.inputs if name not in given]:
         raise UserError(f"{stage.name} needs the input {', '.join(missing)}; give it with --in name=path")
+    for name, path in ((name, path) for name, paths in given.items() for path in paths):
+        if not path.exists():
+            raise UserError(f"{stage.name}, input {name}: there is no file {path}")
     artefacts = {n: [Artefact(path) for path in paths] for n, paths in given.items() if n in STAGE_MODULES}
     files = {name: paths[0] for name, paths in given.items() if name not in STAGE_MODULES}
     ids = {name: [a.attrs["artefact_id"] for a in found] for name, found in artefacts.items()}

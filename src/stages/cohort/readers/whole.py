@@ -1,0 +1,90 @@
+"""Whether files hold all the voxels and pixels that their headers promise: reads them to the end, decodes nothing."""
+
+import gzip
+import math
+import zlib
+from pathlib import Path
+from typing import Any
+
+from mammoreg.errors import DataError
+from stages.cohort.readers.mr_header import is_nifti
+
+_CHUNK = 1 << 22
+
+
+def check_whole_mr(path: Path) -> None:
+    """Check that a NIfTI file, or each DICOM file of a folder, is as long as its header says.
+
+    Raises:
+        DataError: voxels are missing, or what compresses them is damaged.
+    """
+    if path.is_dir():
+        for member in sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")):
+            check_whole_dicom(member)
+    elif is_nifti(path):
+        _check_whole_nifti(path)
+
+
+def _check_whole_nifti(path: Path) -> None:
+    import nibabel
+
+    image: Any = nibabel.load(path)
+    promised = int(image.dataobj.offset) + math.prod(image.shape) * image.header.get_data_dtype().itemsize
+    try:
+        found = _unpacked_size(path) if path.name.lower().endswith(".gz") else path.stat().st_size
+    except (OSError, EOFError, zlib.error) as error:
+        raise DataError(f"{path}: ends early or is damaged ({error}); copy or export it again") from error
+    if found < promised:
+        raise DataError(f"{path}: holds {found} of the {promised} bytes that its header promises; copy it again")
+
+
+def _unpacked_size(path: Path) -> int:
+    """Bytes in a gzip file; it is read to its end, where its checksum is."""
+    size = 0
+    with gzip.open(path) as file:
+        while chunk := file.read(_CHUNK):
+            size += len(chunk)
+    return size
+
+
+def check_whole_dicom(path: Path) -> None:
+    """Check that a DICOM image holds its pixels; a file that is no DICOM image is passed over.
+
+    Raises:
+        DataError: pixels are missing.
+    """
+    from pydicom import dcmread
+    from pydicom.errors import InvalidDicomError
+
+    try:
+        data = dcmread(path)
+    except InvalidDicomError:
+        return
+    except (OSError, EOFError, ValueError) as error:
+        raise DataError(f"{path}: ends early or is damaged; copy or export it again") from error
+    if "Rows" not in data or "BitsAllocated" not in data:
+        return
+    pixels = data.get("PixelData")
+    if not pixels:
+        raise DataError(f"{path}: holds no pixels; copy or export it again")
+    if data.file_meta.TransferSyntaxUID.is_compressed:
+        return  # the length is not known before the pixels are decoded
+    samples = int(data.get("SamplesPerPixel") or 1) * int(data.get("NumberOfFrames") or 1)
+    promised = int(data.Rows) * int(data.Columns) * samples * int(data.BitsAllocated) // 8
+    if len(pixels) < promised:
+        raise DataError(f"{path}: holds {len(pixels)} of the {promised} bytes of its pixels; copy or export it again")
+
+
+def check_whole_picture(path: Path) -> None:
+    """Check that a PNG or TIFF picture can be decoded to its end.
+
+    Raises:
+        DataError: it cannot.
+    """
+    from PIL import Image
+
+    try:
+        with Image.open(path) as picture:
+            picture.load()
+    except (OSError, SyntaxError, ValueError) as error:
+        raise DataError(f"{path}: ends early or is damaged; export the picture again") from error
