@@ -65,7 +65,9 @@ def run(inputs, settings, subject):
         "error_vs_runtime": {{"tables/error_vs_runtime.csv": b"table"}},
         "paper_tables": {{f"tables/{{n}}.csv": b"table" for n in PAPER_TABLES}},
     }}.get({name!r}, {{}})
-    return Fields(arrays={{"level": Array(np.full(3, settings.level), "1", "level")}}, files=files, failure=failure)
+    values = {{"level": settings.level}}
+    arrays = {{"level": Array(np.full(3, settings.level), "1", "level")}}
+    return Fields(arrays=arrays, values=values, files=files, failure=failure)
 
 STAGE = Stage({name!r}, 1, {required!r}, Settings, run, {optional!r}, {takes_failed!r}, {folder!r})
 '''
@@ -124,7 +126,7 @@ def spoil(volume: Path) -> None:
 def snakemake(project: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run Snakemake in a project's copy; `stdout` holds both streams."""
     environment = os.environ | {"PYTHONPATH": str(project / "src")}
-    command = [sys.executable, "-m", "snakemake", "--cores", "2", *arguments]
+    command = [sys.executable, "-m", "snakemake", *arguments]
     return subprocess.run(
         command, cwd=project, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )

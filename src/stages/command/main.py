@@ -77,7 +77,7 @@ def run_command(parser: argparse.ArgumentParser, arguments: Sequence[str] | None
         return command(given)
     except (UserError, DataError) as error:
         print(error, file=sys.stderr)
-        return MISTAKE
+        return error.outcome if isinstance(error, UserError) else MISTAKE
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:

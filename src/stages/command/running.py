@@ -13,7 +13,7 @@ from stages.command.keys import key_values, path_keys_from
 from stages.command.summary import summary
 from stages.command.supervised import supervised
 from stages.engine.errors import UserError
-from stages.engine.outcome import CASES_FAILED, INTERRUPTED, VARIABLE, worst_outcome
+from stages.engine.outcome import BUG, CASES_FAILED, INTERRUPTED, VARIABLE, worst_outcome
 from stages.engine.writing import write_bytes
 
 COMMAND = "MAMMOREG_COMMAND"

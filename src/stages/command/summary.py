@@ -36,12 +36,12 @@ def _lesions(tables: Path) -> Iterator[str]:
     for row in _rows(tables / "predictions_mammogram.csv"):
         if row["method"] == _METHOD and (row["case"], row["name"]) not in landmarks:
             place = f"column {row['column']}, row {row['row']}" if row["column"] else row["message"] or "not seen"
-            yield f"  {_where(row)}: {row['name']} of the MR volume at {place}"
+            yield f"  {_where(row)}: {row['name']} of the MR volume: {place}"
     for row in _rows(tables / "predictions_mr.csv"):
         if row["method"] == _METHOD:
             place = f"x {row['x']}, y {row['y']}, z {row['z']} mm (LPS)" if row["x"] else row["message"]
             note = f", depth not determined ({row['views']} alone)" if row["x"] and "+" not in row["views"] else ""
-            yield f"  {row['case']} {row['views']}: {row['name']} of the mammogram in the MR volume at {place}{note}"
+            yield f"  {row['case']} {row['views']}: {row['name']} of the mammogram: {place}{note}"
 
 
 def _doubted(row: Row) -> bool:
