@@ -79,7 +79,8 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
         """Show one record, or count it."""
         try:
             self._note_outcome(record)
-            if self._as_told:
+            is_error = getattr(record, "event", None) == LogEvent.ERROR
+            if self._as_told and (self.common_settings.verbose or not is_error):
                 self._write(self.format(record))
             else:
                 self._show(record)

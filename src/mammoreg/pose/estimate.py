@@ -4,6 +4,7 @@ Each candidate angle is compressed once with the coarse model; the silhouette is
 remains, with the dense tissue inside, judges the angle against the prior that the header gives.
 """
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,8 @@ from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import Alignment, align, measure
 from mammoreg.pose.density import DensityImage, density_correlation, projected_structure
 from mammoreg.pose.outline import RadialOutline
+
+LOGGER = logging.getLogger(__name__)
 
 # The weights of outline and dense tissue are chosen by what they stand for; none is fitted and none has a source.
 OUTLINE_SAMPLES = 6.0  # independent pieces of information along an outline
@@ -131,12 +134,15 @@ def estimate_pose(
         at = replace(start, angle_deg=view.angle_deg + offset_deg)
         compressed = compress(at)
         if compressed is None:
+            LOGGER.info("angle %.2f degrees: the coarse compression did not converge", at.angle_deg)
             return None
         at = replace(at, height_mm=compressed.height_mm)
         skin = facets.positions(compressed.nodes)
         state = align(skin, facets.quads, at, outline)
         ncc, patches = _density(compressed.nodes, state.view, tissue, mammogram)
         misfit = _misfit(state.rms_mm, ncc, patches, offset_deg / prior_sd_deg)
+        tried_at = "angle %.2f degrees: outline %.2f mm, dense tissue %.3f, misfit %.3f"
+        LOGGER.info(tried_at, at.angle_deg, state.rms_mm, ncc, misfit)
         on_skin = measure(skin, facets.quads, state.view, outline, facets.rim)
         return Candidate(at.angle_deg, state, on_skin, ncc, misfit)
 

@@ -1,5 +1,6 @@
 """Surface of the compressed breast that meets the mammogram's outline."""
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from mammoreg.pose.alignment import Alignment, measure
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
 from mammoreg.shape.outline_ties import outline_ties
+
+LOGGER = logging.getLogger(__name__)
 
 REST_DAMPING = 0.05
 HIDDEN_MM = 0.3  # at the detector
@@ -78,6 +81,7 @@ def estimate_shape(
         memory = memory + np.where(after.weight > 0, np.nan_to_num(after.gap_mm), 0.0) * view.middle_magnification
         memory[rays[hidden]] = 0.0
         done += 1
+        LOGGER.info("round %d: silhouette %.2f mm off the outline on average", done, _mean_misfit(after))
         if _mean_misfit(after) < _mean_misfit(best[0]):
             best = (after, closed)
     after, closed = best

@@ -28,6 +28,7 @@ _CHATTER = (
     "host:",
 )
 _EXCEPTION = re.compile(r"\A(Error: )?[A-Za-z]*(Error|Exception)( in (rule|file) .*?)?(, line \d+)?:\n", re.DOTALL)
+_NO_TARGET = re.compile(r"^No rule to produce (.*?) \(if you use input functions .*$", re.MULTILINE)
 _FRAME = re.compile(r'^ *(File ".*", line \d+, in .*|Traceback \(most recent call last\):)$')
 
 
@@ -39,7 +40,8 @@ def is_chatter(text: str) -> bool:
 def plain(text: str) -> str:
     """A message without the exception that carried it and the places in the code that it passed."""
     lines = [line for line in _EXCEPTION.sub("", text).splitlines() if not _FRAME.match(line)]
-    return "\n".join(lines).strip()
+    no_target = r"there is no target \1; give a study such as table_1, or a file such as a case's localize.h5"
+    return _NO_TARGET.sub(no_target, "\n".join(lines).strip())
 
 
 def killed_by(text: str) -> str | None:

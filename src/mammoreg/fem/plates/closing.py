@@ -1,5 +1,6 @@
 """Plates that close on a patient's breast, to a gap or to a force: load steps of damped equilibria, then rest."""
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -23,6 +24,8 @@ from mammoreg.fem.plates.result import Closed
 from mammoreg.fem.plates.state import DampedState, Load
 
 __all__ = ["COARSE", "Closed", "Closing", "ClosingOptions", "Moving"]
+
+LOGGER = logging.getLogger(__name__)
 
 Moving = Literal["both", "upper", "lower"]
 
@@ -229,6 +232,7 @@ class Closing:
                 state = self._advance(equilibrium, path[-1], gap, min(1.0, load_factor / loaded))
             except NotConvergedError as error:
                 cuts, increment = cuts + 1, 0.5 * increment
+                LOGGER.info("plates at %.1f mm: step to %.1f mm halved (%s)", path[-1].gap_mm, gap, error)
                 if increment < self.options.least_step:
                     came = f"the plates came to {path[-1].gap_mm:.1f} of {gap_mm:.1f} mm"
                     raise NotConvergedError(f"{error}; {came}") from error
@@ -237,6 +241,8 @@ class Closing:
             path.append(LoadStep(state, gap, path[-1].steps + 1, cuts))
             easy = len(equilibrium.residuals) - before <= self.options.easy_iterations
             increment = min(2.0 * increment, LARGEST_STEP) if easy else min(1.5 * increment, max(increment, first))
+        iterations = len(equilibrium.residuals)
+        LOGGER.info("plates at %.1f mm: %d load steps, %d iterations", path[-1].gap_mm, path[-1].steps, iterations)
         return path
 
     def _advance(
