@@ -112,7 +112,7 @@ def test_check_of_a_good_and_a_bad_cohort(tmp_path, capsys):
     [
         (["show", "no.h5"], "there is no file no.h5"),
         (["show", "README.md"], "README.md: is no artefact of this pipeline\n"),
-        (["show", "folder"], "folder: is a folder; name one of the .h5 files in it"),
+        (["show", "folder"], "folder: is a folder, no artefact of this pipeline"),
         (["export", "no.h5", "--to", "out"], "there is no file no.h5"),
         (
             ["run", "segment", "--in", "mr=nothere.nii", "--out", "x.h5"],

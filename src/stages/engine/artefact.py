@@ -87,10 +87,6 @@ class Artefact:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        if path.is_dir():
-            raise ArtefactError(f"{path}: is a folder; name one of the .h5 files in it")
-        if not path.exists():
-            raise ArtefactError(f"there is no file {path}")
         try:
             with h5py.File(path, "r", locking=False) as file:
                 self.attrs: dict[str, str] = {name: _text(value) for name, value in file.attrs.items()}
@@ -100,7 +96,8 @@ class Artefact:
             self.laterality = cast(Literal["L", "R"], self.attrs["laterality"])
             self.failure = _failure(self.attrs)
         except (OSError, KeyError, ValueError) as error:
-            raise ArtefactError(f"{path}: is no artefact of this pipeline") from error
+            what = f"{path}: is {'a folder, ' * path.is_dir()}no artefact of this pipeline"
+            raise ArtefactError(what if path.exists() else f"there is no file {path}") from error
 
     @property
     def ok(self) -> bool:
