@@ -99,7 +99,7 @@ def run_cohort(given: argparse.Namespace, cases: Path | None, views: Path | None
     outcome.unlink(missing_ok=True)
     if code == INTERRUPTED:
         print(f"\nStopped. What is finished is kept; the same command goes on:\n  {_command_line()}", file=sys.stderr)
-    elif code in (0, CASES_FAILED, BUG) and not (given.dry_run or given.unlock):
+    elif code in ((0,) if targets else (0, CASES_FAILED, BUG)) and not (given.dry_run or given.unlock):
         print(summary(results, targets), file=sys.stderr)
     return code
 
