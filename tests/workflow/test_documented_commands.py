@@ -45,7 +45,8 @@ def desk(tmp_path_factory):
     """A checkout with a user's files in it: what the documents' commands name."""
     folder = tmp_path_factory.mktemp("desk") / "checkout"
     folder.mkdir()
-    for name in ("Snakefile", "Makefile", "pyproject.toml", "workflow", "profiles", "config"):
+    files = ("Snakefile", "Makefile", "pyproject.toml", "requirements.lock", "requirements-dev.lock")
+    for name in (*files, "workflow", "profiles", "config"):
         source = PROJECT / name
         (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
     for place in (folder, folder / "my"):
