@@ -21,9 +21,9 @@ def summary(results: Path, targets: Sequence[str] = ()) -> str:
         results: the results folder.
         targets: what alone was asked for; none for the whole cohort.
     """
-    if targets:
-        return "\n".join(["done", *_places(results, results / "tables")])
     tables = results / "tables"
+    if targets or not (tables / "views.csv").exists():
+        return "\n".join(_places(results, tables))
     trust = [f"  {_where(row)}: {row['trust']}" for row in _rows(tables / "views.csv") if _doubted(row)]
     lines = [f"results, method {_METHOD}:", *_shortened(list(_lesions(tables)), "no lesion was marked")]
     lines += ["warnings:", *_shortened(trust)] if trust else []
