@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.breast.compression import Compression, prepare_compression
 from mammoreg.breast.interior import plates_around, solve_interior
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.errors import DataError, NotConvergedError
 from mammoreg.fem.plates.closing import Closed
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, lps_to_breast
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.acquisition import Mammogram
 from mammoreg.imaging.mr_segment import BiasField, SegmentSettings, no_bias, segment_volume
 from mammoreg.localization.deformation import MeshDeformation, MethodView, ReferenceMesh

@@ -6,8 +6,8 @@ A canonical image has the chest wall at column 0 and its rows run towards medial
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.errors import DataError
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.lesions import (
     LesionArea,
     MaskLesion,

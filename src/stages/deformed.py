@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import breast_to_lps, breast_to_plate
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.quality import folded_corners
 from mammoreg.meshing.trilinear import volumes
 from mammoreg.metrics.drift import sideways_drift_mm

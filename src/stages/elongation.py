@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry, breast_to_plate
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import MethodView
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.metrics.elongation import Direction, extents_mm

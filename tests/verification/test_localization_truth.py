@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry, Volume
-from mammoreg.geometry.frames import Points, plate_rotation
+from mammoreg.geometry.frames import plate_rotation
 from mammoreg.localization.deformation import MethodView
 from mammoreg.localization.grid import BreastGrid, BreastInView
 from mammoreg.localization.lesions import LesionArea, MaskLesion, area_from_mask

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, replace
 
+from mammoreg.arrays import Floats
 from mammoreg.breast.mechanics import BreastMechanics
-from mammoreg.breast.placed import Floats, PlacedBreast, closing_plates, place_breast
+from mammoreg.breast.placed import PlacedBreast, closing_plates, place_breast
 from mammoreg.contact.soft import touching
 from mammoreg.fem.plates.closing import Closing, ClosingOptions
 from mammoreg.geometry import ViewGeometry, breast_to_plate

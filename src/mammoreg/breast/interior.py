@@ -3,14 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.breast.placed import Floats, PlacedBreast
+from mammoreg.arrays import Floats, Points
+from mammoreg.breast.placed import PlacedBreast
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.fem.parts.standing_plates import StandingPlates
 from mammoreg.fem.plates.closing import Closing
 from mammoreg.fem.plates.standing import standing_plates
 from mammoreg.fem.prescribed.equilibrium import NewtonOptions
 from mammoreg.fem.prescribed.solve import PrescribedOptions, PrescribedResult, solve_prescribed
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.parts.back import BackCondition, back_condition
@@ -17,7 +18,6 @@ from mammoreg.geometry import breast_to_plate
 from mammoreg.materials.tissue import BreastTissue, catalogue_tissue, neo_hookean_tissue
 from mammoreg.meshing.block import BlockMesh
 
-Floats = NDArray[np.float64]
 _INFERIOR, _ANTERIOR = np.array([0.0, 0.0, -1.0]), np.array([0.0, -1.0, 0.0])
 
 

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import DataError
-
-Array = NDArray[np.float64]
 
 FLAT = 1e9
 """Posterior coordinate, mm, of the edge of a plate without end."""
@@ -23,11 +21,11 @@ class Gap:
         curvature: (...,), 1/mm, of the surface across the lip, zero elsewhere.
     """
 
-    distance: Array
-    normal: Array
-    curvature: Array
+    distance: Floats
+    normal: Floats
+    curvature: Floats
 
-    def hessian(self) -> Array:
+    def hessian(self) -> Floats:
         """Second derivative of the distance (..., 3, 3), 1/mm."""
         across = np.zeros_like(self.normal)
         across[..., 1], across[..., 2] = -self.normal[..., 2], self.normal[..., 1]
@@ -50,7 +48,7 @@ class Plate:
     edge_p_mm: float | None = None
     lip_radius_mm: float = 5.0
 
-    def gap(self, points: Array) -> Gap:
+    def gap(self, points: Floats) -> Gap:
         """Distance of points (..., 3), mm, its gradient and curvature; continuous gradient outside and on the face."""
         edge = FLAT if self.edge_p_mm is None else self.edge_p_mm
         radius = self.lip_radius_mm
@@ -66,7 +64,7 @@ class Plate:
         distance = np.where(rounded, length, np.maximum(across, above)) - radius
         return Gap(distance, normal, np.where(rounded, 1.0 / safe, 0.0))
 
-    def first_touch(self, points: Array) -> float:
+    def first_touch(self, points: Floats) -> float:
         """Height, mm, of the face at which the plate, coming from afar, first touches one of the points (N, 3).
 
         Raises:

@@ -18,13 +18,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.contact.plate import Array, Gap, Plate
+from mammoreg.arrays import Floats
+from mammoreg.contact.plate import Gap, Plate
 from mammoreg.contact.surface import ContactSurface
 
 STICKING_PRESSURE_KPA = 0.1  # gives friction a little stiffness where there was no pressure yet
 
 
-NONE: Array = np.zeros(0)
+NONE: Floats = np.zeros(0)
 """State that a contact does not need."""
 
 
@@ -39,10 +40,10 @@ class SoftMemory:
         shift: added to the distances (plates, F, q), mm; empty without augmentation.
     """
 
-    anchor: Array
-    traction: Array
-    pressure: Array
-    shift: Array = field(default_factory=NONE.copy)
+    anchor: Floats
+    traction: Floats
+    pressure: Floats
+    shift: Floats = field(default_factory=NONE.copy)
 
     def part(self, faces: NDArray[np.bool_]) -> "SoftMemory":
         """What the contact points of the faces that a mask (F,) selects remember."""
@@ -65,11 +66,11 @@ class SoftTerms:
         penetration_mm: deepest point inside a plate.
     """
 
-    force: Array
-    stiffness: Array
-    pressure: Array
-    traction: Array
-    plate_force: Array
+    force: Floats
+    stiffness: Floats
+    pressure: Floats
+    traction: Floats
+    plate_force: Floats
     penetration_mm: float
 
 
@@ -104,7 +105,7 @@ class SoftContact:
         """Whether friction has no limit."""
         return bool(np.isinf(self.friction))
 
-    def start(self, nodes: Array, plates: Sequence[Plate], height: float) -> SoftMemory:
+    def start(self, nodes: Floats, plates: Sequence[Plate], height: float) -> SoftMemory:
         """Memory of a body that has not pressed yet, at nodes (N, 3); where it touches already, sticking begins."""
         if self.friction == 0.0:
             return SoftMemory(NONE, NONE, NONE)
@@ -116,7 +117,7 @@ class SoftContact:
         return SoftMemory(anchor, np.zeros_like(anchor), pressure)
 
     def remember(
-        self, nodes: Array, plates: Sequence[Plate], height: float, terms: SoftTerms, before: SoftMemory
+        self, nodes: Floats, plates: Sequence[Plate], height: float, terms: SoftTerms, before: SoftMemory
     ) -> SoftMemory:
         """Memory after a converged step that began with the memory `before`."""
         if self.friction == 0.0:
@@ -128,13 +129,13 @@ class SoftContact:
             traction = np.zeros_like(anchor)
         return SoftMemory(anchor, traction, terms.pressure, before.shift)
 
-    def augmented(self, nodes: Array, plates: Sequence[Plate], height: float, memory: SoftMemory) -> SoftMemory:
+    def augmented(self, nodes: Floats, plates: Sequence[Plate], height: float, memory: SoftMemory) -> SoftMemory:
         """Memory whose shifts let each plate press as now with the points on its face, and no others."""
         points = self.points(nodes, height)
         distance = np.stack([self._distance(plate.gap(points), memory, k) for k, plate in enumerate(plates)])
         return replace(memory, shift=np.minimum(distance, self.band_mm))
 
-    def terms(self, nodes: Array, height: float, plates: Sequence[Plate], memory: SoftMemory) -> SoftTerms:
+    def terms(self, nodes: Floats, height: float, plates: Sequence[Plate], memory: SoftMemory) -> SoftTerms:
         """Forces and tangent at nodes (N, 3) with the plates raised by `height` mm."""
         points = self.points(nodes, height)
         relative = self._relative(nodes, plates, height) if self.friction > 0.0 else None
@@ -160,7 +161,7 @@ class SoftContact:
         traction = np.stack(tractions) if tractions else NONE
         return SoftTerms(force, stiffness, np.stack(pressures), traction, np.stack(forces), deepest)
 
-    def energy_mj(self, nodes: Array, height: float, plates: Sequence[Plate], memory: SoftMemory) -> float:
+    def energy_mj(self, nodes: Floats, height: float, plates: Sequence[Plate], memory: SoftMemory) -> float:
         """Potential of the pressure and of friction with its lagged limit."""
         points = self.points(nodes, height)
         relative = self._relative(nodes, plates, height) if self.friction > 0.0 else None
@@ -172,34 +173,34 @@ class SoftContact:
                 density += self._friction_energy(plate, memory, k, relative[k] - memory.anchor[k])
         return 1e-3 * float((density * self.surface.area).sum())
 
-    def points(self, nodes: Array, height: float) -> Array:
+    def points(self, nodes: Floats, height: float) -> Floats:
         """Contact points (F, q, 3) as the plates see them that are raised by `height` mm."""
         return np.asarray(self.surface.positions(nodes) - np.array([0.0, 0.0, height]))
 
     @staticmethod
-    def _distance(gap: Gap, memory: SoftMemory, k: int) -> Array:
+    def _distance(gap: Gap, memory: SoftMemory, k: int) -> Floats:
         """Distance (F, q) that the barrier of plate k takes."""
         return np.asarray(gap.distance + memory.shift[k]) if memory.shift.size else gap.distance
 
-    def _relative(self, nodes: Array, plates: Sequence[Plate], height: float) -> Array:
+    def _relative(self, nodes: Floats, plates: Sequence[Plate], height: float) -> Floats:
         points = self.surface.positions(nodes)
         return np.stack([points - np.array([0.0, 0.0, plate.height_mm + height]) for plate in plates])
 
-    def _barrier(self, distance: Array) -> tuple[Array, Array]:
+    def _barrier(self, distance: Floats) -> tuple[Floats, Floats]:
         """Pressure, kPa, and minus its derivative by the distance, kPa/mm."""
         depth = np.clip(self.band_mm - distance, 0.0, 2.0 * self.band_mm)
         slope = self.stiffness * depth / (2.0 * self.band_mm)
         pressure = 0.5 * slope * depth + self.stiffness * np.maximum(-distance - self.band_mm, 0.0)
         return pressure, slope
 
-    def _barrier_energy(self, distance: Array) -> Array:
+    def _barrier_energy(self, distance: Floats) -> Floats:
         """Energy per area, mN/mm, whose derivative by the distance is minus the pressure."""
         depth = np.clip(self.band_mm - distance, 0.0, 2.0 * self.band_mm)
         beyond = np.maximum(-distance - self.band_mm, 0.0)
         early = depth**3 / (12.0 * self.band_mm)
         return np.asarray(self.stiffness * (early + beyond * (self.band_mm + 0.5 * beyond)))
 
-    def _limit(self, pressure: Array) -> tuple[Array, Array]:
+    def _limit(self, pressure: Floats) -> tuple[Floats, Floats]:
         """Limit of friction (F, q), kPa, under a lagged pressure, and its stiffness while it sticks, kPa/mm."""
         if self.sticks:
             pressing = pressure > 0.0
@@ -207,7 +208,7 @@ class SoftContact:
         limit = self.friction * pressure
         return limit, np.maximum(limit, self.friction * STICKING_PRESSURE_KPA) / self.slip_mm
 
-    def _friction(self, plate: Plate, memory: SoftMemory, k: int, slip: Array) -> tuple[Array, Array]:
+    def _friction(self, plate: Plate, memory: SoftMemory, k: int, slip: Floats) -> tuple[Floats, Floats]:
         """Radial return within a disc of lagged radius: traction (F, q, 3) and its stiffness (F, q, 3, 3)."""
         limit, stick = self._limit(memory.pressure[k])
         plane = _tangential(plate, memory.anchor[k])
@@ -220,7 +221,7 @@ class SoftContact:
         along = np.where(slides[..., None, None], direction[..., :, None] * direction[..., None, :], 0.0)
         return trial * fraction[..., None], (fraction * stick)[..., None, None] * (plane - along)
 
-    def _friction_energy(self, plate: Plate, memory: SoftMemory, k: int, slip: Array) -> Array:
+    def _friction_energy(self, plate: Plate, memory: SoftMemory, k: int, slip: Floats) -> Floats:
         """Potential per area, mN/mm, of `_friction`."""
         limit, stick = self._limit(memory.pressure[k])
         plane = _tangential(plate, memory.anchor[k])
@@ -229,7 +230,7 @@ class SoftContact:
         within = np.minimum(size, limit)
         return np.asarray(within * (size - 0.5 * within) / np.where(stick > 0.0, stick, np.inf))
 
-    def _to_corners(self, force: Array, stiffness: Array) -> tuple[Array, Array]:
+    def _to_corners(self, force: Floats, stiffness: Floats) -> tuple[Floats, Floats]:
         faces, shape = len(self.surface.quads), self.surface.shape
         interpolation = np.zeros((len(shape), 3, 13))
         for axis in range(3):
@@ -240,7 +241,7 @@ class SoftContact:
         return force.reshape(faces, -1) @ flat, flat.T @ product.reshape(faces, -1, 13)
 
 
-def _tangential(plate: Plate, anchor: Array) -> Array:
+def _tangential(plate: Plate, anchor: Floats) -> Floats:
     """Projections (F, q, 3, 3) onto the plate's face at the anchors, where friction acts: fixed within a step."""
     normal = plate.gap(anchor + np.array([0.0, 0.0, plate.height_mm])).normal
     return np.asarray(np.eye(3) - normal[..., :, None] * normal[..., None, :])

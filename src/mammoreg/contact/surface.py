@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from mammoreg.arrays import Floats, Integers
+
 Rule = Literal["nodes", "simpson", "gauss2", "gauss3"]
 
-_LINE_RULES: dict[str, tuple[Array, Array]] = {
+_LINE_RULES: dict[str, tuple[Floats, Floats]] = {
     "nodes": (np.array([-1.0, 1.0]), np.array([1.0, 1.0])),
     "simpson": (np.array([-1.0, 0.0, 1.0]), np.array([1.0, 4.0, 1.0]) / 3.0),
     "gauss2": (np.array([-1.0, 1.0]) / 3.0**0.5, np.array([1.0, 1.0])),
@@ -31,17 +31,17 @@ class ContactSurface:
         area: undeformed area of each point, (F, q), mm2.
     """
 
-    def __init__(self, points: Array, quads: NDArray[np.integer], rule: Rule = "simpson") -> None:
+    def __init__(self, points: Floats, quads: NDArray[np.integer], rule: Rule = "simpson") -> None:
         self.quads: Integers = np.array(quads, dtype=np.int64)
         place, weight = _LINE_RULES[rule]
         r, s = (g.ravel() for g in np.meshgrid(place, place, indexing="ij"))
         corner = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
         along, across = 1.0 + corner[:, 0] * r[:, None], 1.0 + corner[:, 1] * s[:, None]
-        self.shape: Array = 0.25 * along * across
+        self.shape: Floats = 0.25 * along * across
         slopes = np.stack([0.25 * corner[:, 0] * across, 0.25 * corner[:, 1] * along])
         tangents = np.einsum("dqa,fai->dfqi", slopes, np.asarray(points, dtype=float)[self.quads])
         size = np.linalg.norm(np.cross(tangents[0], tangents[1]), axis=-1)
-        self.area: Array = size * np.outer(weight, weight).ravel()
+        self.area: Floats = size * np.outer(weight, weight).ravel()
 
     def part(self, faces: NDArray[np.bool_]) -> "ContactSurface":
         """The faces that a mask (F,) selects."""
@@ -49,6 +49,6 @@ class ContactSurface:
         other.quads, other.area = self.quads[faces], self.area[faces]
         return other
 
-    def positions(self, nodes: Array) -> Array:
+    def positions(self, nodes: Floats) -> Floats:
         """Contact points (F, q, 3) of nodes (N, 3)."""
         return np.asarray(np.einsum("qa,fai->fqi", self.shape, nodes[self.quads]))

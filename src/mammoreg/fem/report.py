@@ -5,8 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
 
+from mammoreg.arrays import Floats
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.parts.part import Part
 
 
@@ -67,8 +67,8 @@ class Stopwatch:
 
 def solve_report(
     model: HyperelasticModel,
-    positions: Array,
-    pressure: Array,
+    positions: Floats,
+    pressure: Floats,
     parts: Sequence[Part],
     residuals: Sequence[float],
     watch: Stopwatch,

@@ -5,9 +5,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
+
 Laterality = Literal["L", "R"]
 Frame = Literal["LPS", "breast", "plate"]
-Points = NDArray[np.float64]
 
 
 def lps_to_breast(points: Points, laterality: Laterality) -> Points:

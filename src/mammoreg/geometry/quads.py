@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.geometry.frames import Points
+from mammoreg.arrays import Points
 
 
 def area_vectors(points: Points, quads: NDArray[np.integer]) -> Points:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.geometry.frames import Points
+from mammoreg.arrays import Points
 
 
 @dataclass(frozen=True)

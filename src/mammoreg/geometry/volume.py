@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from mammoreg.geometry.frames import Frame, Laterality, Points
+from mammoreg.arrays import Points
+from mammoreg.geometry.frames import Frame, Laterality
 
 
 @dataclass(frozen=True)

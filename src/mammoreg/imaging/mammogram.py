@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.imaging.mammogram_air import Pixels, find_air
+from mammoreg.arrays import Floats32
+from mammoreg.imaging.mammogram_air import find_air
 from mammoreg.imaging.mammogram_breast import breast_mask, edge_level, smoothed
 from mammoreg.imaging.mammogram_nipple import nipple_in_outline
 from mammoreg.imaging.mammogram_orientation import View
@@ -65,7 +66,7 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
     )
 
 
-def _reduced(image: Pixels, factor: int) -> Pixels:
+def _reduced(image: Floats32, factor: int) -> Floats32:
     if factor == 1:
         return image
     rows, columns = (-(-n // factor) * factor for n in image.shape)

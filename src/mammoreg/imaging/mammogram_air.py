@@ -6,9 +6,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats32
 from mammoreg.errors import DataError
 
-Pixels = NDArray[np.float32]
 Side = Literal["left", "right"]
 
 _STRIP_SHARE = 0.02
@@ -54,12 +54,12 @@ def find_air(pixels: NDArray[Any]) -> Air:
     return Air(level, noise, side, bright=_breast_is_darker(image, level, noise))
 
 
-def _border_strips(image: Pixels) -> dict[Side, Pixels]:
+def _border_strips(image: Floats32) -> dict[Side, Floats32]:
     width = max(2, round(_STRIP_SHARE * image.shape[1]))
     return {"left": image[:, :width], "right": image[:, -width:]}
 
 
-def _air_side(image: Pixels, strips: dict[Side, Pixels]) -> Side:
+def _air_side(image: Floats32, strips: dict[Side, Floats32]) -> Side:
     left, right = (float(np.ptp(np.percentile(strips[side], (10, 90)))) for side in ("left", "right"))
     if max(left, right) > _FLAT_SHARE * float(np.ptp(np.percentile(image, (1, 99)))):
         return "left" if left < right else "right"
@@ -69,7 +69,7 @@ def _air_side(image: Pixels, strips: dict[Side, Pixels]) -> Side:
     return "left" if difference[:middle].sum() < difference[-middle:].sum() else "right"
 
 
-def _breast_is_darker(image: Pixels, level: float, noise: float) -> bool:
+def _breast_is_darker(image: Floats32, level: float, noise: float) -> bool:
     difference = image[::4, ::4] - level
     reach = float(np.percentile(np.abs(difference), 99))
     seen = np.abs(difference) > max(_DIFFERENT_SHARE * reach, 5.0 * noise)

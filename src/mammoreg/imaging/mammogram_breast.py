@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Floats32
 from mammoreg.errors import DataError
-from mammoreg.imaging.mammogram_air import Air, Pixels
+from mammoreg.imaging.mammogram_air import Air
 
 _EDGE_SHARE = 0.035
 _NOISE_SIGMAS = 6.0
@@ -15,19 +16,19 @@ _SMOOTHING_MM = 0.25
 _LEAST_AREA_MM2 = 500.0
 
 
-def smoothed(pixels: Pixels, pixel_mm: float) -> Pixels:
+def smoothed(pixels: Floats32, pixel_mm: float) -> Floats32:
     """The image with its noise damped for edge finding (Gaussian of 0.25 mm)."""
     return np.asarray(ndimage.gaussian_filter(pixels, _SMOOTHING_MM / pixel_mm), dtype=np.float32)
 
 
-def edge_level(pixels: Pixels, air: Air) -> float:
+def edge_level(pixels: Floats32, air: Air) -> float:
     """Grey value that separates skin from air: just above the air's noise, a few percent of the tissue's range."""
     tissue = pixels[pixels > air.level + _NOISE_SIGMAS * air.noise]
     reach = float(np.percentile(tissue, 90)) - air.level if tissue.size else 0.0
     return air.level + max(_EDGE_SHARE * reach, _NOISE_SIGMAS * air.noise)
 
 
-def breast_mask(smooth: Pixels, level: float, pixel_mm: float) -> NDArray[np.bool_]:
+def breast_mask(smooth: Floats32, level: float, pixel_mm: float) -> NDArray[np.bool_]:
     """Mask (rows, columns) of the largest connected region above a level, filled; text and markers are left out.
 
     Raises:

@@ -5,20 +5,22 @@ from numpy.typing import NDArray
 from scipy import ndimage, signal
 from skimage import measure
 
+from mammoreg.arrays import Floats32
 from mammoreg.errors import DataError
-from mammoreg.imaging.mammogram_air import Air, Pixels
+from mammoreg.imaging.mammogram_air import Air
 
-_STEP_MM = 1.0
-_SAMPLING_MM = 0.25
-_WINDOW_MM = 5.0
-_MARGIN_MM = 1.0
-_INSIDE_MM = 0.75
-_REFINED_MM = 0.05
-FADE_MM = 10.0
+# All chosen, from the blur and the pixels of a mammogram.
+_STEP_MM = 1.0  # of the outline's points
+_SAMPLING_MM = 0.25  # of the contour before it is smoothed
+_WINDOW_MM = 5.0  # over which a cubic smooths it
+_MARGIN_MM = 1.0  # about the mask's border, within which the edge is sought
+_INSIDE_MM = 0.75  # how far in and out half of the brightness is sought
+_REFINED_MM = 0.05  # in steps of
+FADE_MM = 10.0  # over which trust fades before chest wall, border and muscle
 
 
 def outline_polyline(
-    smooth: Pixels, mask: NDArray[np.bool_], level: float, air: Air, pixel_mm: float
+    smooth: Floats32, mask: NDArray[np.bool_], level: float, air: Air, pixel_mm: float
 ) -> NDArray[np.float64]:
     """Smooth polyline (M, 2) of (column, row) between skin and air, 1 mm apart, from its low-row to its high-row end.
 
@@ -55,14 +57,14 @@ def outline_weight(
     return np.asarray(np.clip(distance / FADE_MM, 0.0, 1.0), dtype=float)
 
 
-def _only_breast(smooth: Pixels, mask: NDArray[np.bool_], air: Air, pixel_mm: float) -> Pixels:
+def _only_breast(smooth: Floats32, mask: NDArray[np.bool_], air: Air, pixel_mm: float) -> Floats32:
     near = ndimage.distance_transform_edt(~mask) * pixel_mm <= _MARGIN_MM
     deep = ndimage.distance_transform_edt(mask) * pixel_mm > _MARGIN_MM
     image = np.where(near, smooth, np.float32(air.level))
     return np.asarray(np.where(deep, smooth.max(), image), dtype=np.float32)
 
 
-def _longest_contour(image: Pixels, level: float) -> NDArray[np.float64]:
+def _longest_contour(image: Floats32, level: float) -> NDArray[np.float64]:
     contours = measure.find_contours(image, level)
     if not contours:
         raise DataError("the breast in the mammogram shows no edge against air; the image is cropped too tightly")
@@ -78,7 +80,7 @@ def _open_at_chest_wall(contour: NDArray[np.float64], margin: float) -> NDArray[
 
 
 def _at_half_height(
-    contour: NDArray[np.float64], smooth: Pixels, mask: NDArray[np.bool_], air: Air, pixel_mm: float
+    contour: NDArray[np.float64], smooth: Floats32, mask: NDArray[np.bool_], air: Air, pixel_mm: float
 ) -> NDArray[np.float64]:
     """Move each point along its normal to half of the brightness that is reached just inside.
 
@@ -97,7 +99,7 @@ def _at_half_height(
     return np.asarray(places[np.arange(len(contour)), first], dtype=float)
 
 
-def _sample(image: Pixels, places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sample(image: Floats32, places: NDArray[np.float64]) -> NDArray[np.float64]:
     values = ndimage.map_coordinates(image, [places[..., 1], places[..., 0]], order=1, mode="nearest")
     return np.asarray(values, dtype=float)
 

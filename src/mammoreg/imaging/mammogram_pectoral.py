@@ -4,21 +4,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from mammoreg.imaging.mammogram_air import Pixels
+from mammoreg.arrays import Floats32
 
-_GRID_MM = 1.0
-_STEP_MM = 3.0
-_NORMAL_DEG = np.arange(8.0, 66.0, 2.0)
+# All chosen.
+_GRID_MM = 1.0  # of the reduced image
+_STEP_MM = 3.0  # on either side of an edge, between which brightness drops
+_NORMAL_DEG = np.arange(8.0, 66.0, 2.0)  # directions tried, from the chest wall's normal
 _LEAST_LENGTH_MM = 25.0
-_LEAST_CONTRAST_SHARE = 0.12
-_LEAST_CONSISTENCY = 0.85
-_RIM_MM = 10.0
-_LARGEST_SHARE = 0.45
-_BAND_MM = 8.0
-_BEND_COST = 0.15
+_LEAST_CONTRAST_SHARE = 0.12  # mean drop, of the breast's range of brightness
+_LEAST_CONSISTENCY = 0.85  # of the edge's points must be brighter behind it
+_RIM_MM = 10.0  # from the skin, where brightness falls off anyway
+_LARGEST_SHARE = 0.45  # of the breast behind the edge at most
+_BAND_MM = 8.0  # within which the straight edge is bent
+_BEND_COST = 0.15  # of one pixel of bend, in units of the largest drop
 
 
-def pectoral_mask(pixels: Pixels, mask: NDArray[np.bool_], pixel_mm: float) -> NDArray[np.bool_] | None:
+def pectoral_mask(pixels: Floats32, mask: NDArray[np.bool_], pixel_mm: float) -> NDArray[np.bool_] | None:
     """Mask of the pectoral muscle in a canonical MLO image, or None where no consistent edge is found.
 
     A straight edge with the largest mean drop of brightness away from the corner is searched, then bent to the image
@@ -41,7 +42,7 @@ def pectoral_mask(pixels: Pixels, mask: NDArray[np.bool_], pixel_mm: float) -> N
     return np.asarray(corner[np.ix_(rows, columns)] & mask, dtype=bool)
 
 
-def _block_mean(image: Pixels, factor: int) -> Pixels:
+def _block_mean(image: Floats32, factor: int) -> Floats32:
     rows, columns = (n - n % factor for n in image.shape)
     blocks = image[:rows, :columns].reshape(rows // factor, factor, columns // factor, factor)
     return np.asarray(blocks.mean(axis=(1, 3)), dtype=np.float32)
@@ -68,7 +69,7 @@ def _away_from_skin(inside: NDArray[np.bool_], grid_mm: float) -> NDArray[np.boo
 
 
 def _best_line(
-    image: Pixels, inside: NDArray[np.bool_], deep: NDArray[np.bool_], grid_mm: float
+    image: Floats32, inside: NDArray[np.bool_], deep: NDArray[np.bool_], grid_mm: float
 ) -> tuple[NDArray[np.float64], float] | None:
     """Normal (2,) and offset of the line with the largest drop of brightness away from the upper posterior corner."""
     rows, across = np.indices(image.shape)
@@ -85,7 +86,7 @@ def _best_line(
 
 
 def _line_score(
-    image: Pixels, deep: NDArray[np.bool_], normal: NDArray[np.float64], offset: float, grid_mm: float, reach: float
+    image: Floats32, deep: NDArray[np.bool_], normal: NDArray[np.float64], offset: float, grid_mm: float, reach: float
 ) -> float | None:
     points = _line_points(normal, offset, image.shape)
     step = _STEP_MM / grid_mm * normal
@@ -101,7 +102,7 @@ def _line_score(
 
 
 def _behind_bent_edge(
-    image: Pixels, inside: NDArray[np.bool_], line: tuple[NDArray[np.float64], float], grid_mm: float
+    image: Floats32, inside: NDArray[np.bool_], line: tuple[NDArray[np.float64], float], grid_mm: float
 ) -> NDArray[np.bool_]:
     normal, offset = line
     points = _line_points(normal, offset, image.shape)

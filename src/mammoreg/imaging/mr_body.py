@@ -5,10 +5,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.filters import threshold_otsu
 
+from mammoreg.arrays import Bools
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-
-Mask = NDArray[np.bool_]
 
 GHOST_SHARE = 0.3
 """Share of the surrounding tissue's intensity below which a bright place beside the body is a ghost."""
@@ -30,7 +29,7 @@ def air_threshold(samples: NDArray[np.float32]) -> tuple[float, float]:
     return threshold, float(samples[samples < threshold].mean())
 
 
-def outside_air(dark: Mask) -> Mask:
+def outside_air(dark: Bools) -> Bools:
     """Dark voxels reached from the anterior face of the grid (posterior index 0): air, and neither lung nor vessel.
 
     Passages narrower than six voxels are closed, so that noise in the chest wall does not open the lungs.
@@ -44,7 +43,7 @@ def outside_air(dark: Mask) -> Mask:
     return np.asarray(air[3:-3, 3:, 3:-3], dtype=np.bool_)
 
 
-def body_mask(volume: Volume) -> Mask:
+def body_mask(volume: Volume) -> Bools:
     """Body against air, to about half a voxel: skin closed, lungs and other dark holes filled.
 
     A global threshold finds the body; then the level half-way between air and the tissue nearby (within some 4 mm) sets
@@ -64,14 +63,14 @@ def body_mask(volume: Volume) -> Mask:
     return _solid(fine | core)
 
 
-def _local_mean(values: NDArray[np.float32], mask: Mask, sigma: NDArray[np.float64]) -> NDArray[np.float32]:
+def _local_mean(values: NDArray[np.float32], mask: Bools, sigma: NDArray[np.float64]) -> NDArray[np.float32]:
     """Mean of the masked values nearby, by a Gaussian of `sigma` voxels; 0 far from the mask."""
     weight = ndimage.gaussian_filter(mask.astype(np.float32), sigma, truncate=2.5)
     total = ndimage.gaussian_filter(np.where(mask, values, np.float32(0.0)), sigma, truncate=2.5)
     return np.asarray(np.where(weight > 0.02, total / np.maximum(weight, 0.02), 0.0), dtype=np.float32)
 
 
-def _solid(bright: Mask) -> Mask:
+def _solid(bright: Bools) -> Bools:
     """Largest piece of a bright region with its holes filled and its skin closed."""
     closed = ndimage.binary_closing(bright, ndimage.generate_binary_structure(3, 1), iterations=2, border_value=0)
     body = ~outside_air(~(closed | bright))

@@ -4,10 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Bools, Points
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
-from mammoreg.imaging.mr_body import Mask
 from mammoreg.imaging.mr_chest_wall import BackSurface
 
 OPENING_MM = 8.0
@@ -16,7 +15,7 @@ NIPPLE_MM = 3.5
 """In the front half a ball of this radius is enough; ghosts beside the skin are thinner."""
 
 
-def breast_mask(body: Mask, grid: Volume, back: BackSurface, apex: Points) -> Mask:
+def breast_mask(body: Bools, grid: Volume, back: BackSurface, apex: Points) -> Bools:
     """The part of the body in front of the back that hangs together with the apex, smooth to about a voxel.
 
     Raises:
@@ -33,7 +32,7 @@ def breast_mask(body: Mask, grid: Volume, back: BackSurface, apex: Points) -> Ma
     return _smooth_skin(with_nipple, ahead)
 
 
-def _piece_near(mask: Mask, grid: Volume, apex: Points) -> Mask:
+def _piece_near(mask: Bools, grid: Volume, apex: Points) -> Bools:
     """The connected piece of a mask that fills most of the box of some 30 mm around the apex."""
     label, _ = ndimage.label(mask)
     index, reach = np.rint(grid.to_index(apex)).astype(int), int(17.0 / grid.spacing[0])
@@ -44,14 +43,14 @@ def _piece_near(mask: Mask, grid: Volume, apex: Points) -> Mask:
     return np.asarray(label == int(np.argmax(counts)))
 
 
-def _smooth_skin(mask: Mask, ahead: Mask) -> Mask:
+def _smooth_skin(mask: Bools, ahead: Bools) -> Bools:
     """A mask with its skin smoothed over a voxel and its rim at the back left sharp."""
     inside = ndimage.gaussian_filter(mask.astype(np.float32), 1.0, truncate=3.0)
     room = ndimage.gaussian_filter(ahead.astype(np.float32), 1.0, truncate=3.0)
     return np.asarray((inside > 0.5 * room) & ahead, dtype=np.bool_)
 
 
-def back_points(breast: Mask, grid: Volume, back: BackSurface, step_mm: float = 4.0) -> Points:
+def back_points(breast: Bools, grid: Volume, back: BackSurface, step_mm: float = 4.0) -> Points:
     """Points (N, 3) of the back, mm, regular in m and s, wherever the breast lies directly in front of it."""
     step = max(round(step_mm / float(grid.spacing[0])), 1)
     i, k = np.meshgrid(np.arange(0, grid.shape[0], step), np.arange(0, grid.shape[2], step), indexing="ij")
@@ -63,7 +62,7 @@ def back_points(breast: Mask, grid: Volume, back: BackSurface, step_mm: float = 
     return points[valid]
 
 
-def _opened(mask: Mask, spacing: NDArray[np.float64], radius_mm: float) -> Mask:
+def _opened(mask: Bools, spacing: NDArray[np.float64], radius_mm: float) -> Bools:
     """Union of the balls of a radius that fit into a mask; the grid's faces do not bound it."""
     centres = ndimage.distance_transform_edt(mask, sampling=spacing) > radius_mm
     return np.asarray(ndimage.distance_transform_edt(~centres, sampling=spacing) <= radius_mm)

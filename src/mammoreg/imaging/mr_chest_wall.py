@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_corners import base_corners
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ class Bend:
     end: float
     rise: float
 
-    def forward(self, s: Array) -> Array:
+    def forward(self, s: Floats) -> Floats:
         """How far the surface has come forward at s, mm."""
         u = (s - self.start) / (self.end - self.start)
         return self.rise * np.where(u < 0.0, 0.0, np.where(u < 1.0, u**2, 2.0 * u - 1.0))
@@ -61,11 +59,11 @@ class BackSurface:
         bends: above and below, where the breast goes over into the torso.
     """
 
-    centre: Array
-    coefficients: Array
+    centre: Floats
+    coefficients: Floats
     bends: tuple[Bend, ...] = ()
 
-    def posterior(self, m: Array, s: Array) -> Array:
+    def posterior(self, m: Floats, s: Floats) -> Floats:
         """Posterior coordinate at medial and superior coordinates, mm."""
         x, z = m - self.centre[0], s - self.centre[1]
         c = self.coefficients
@@ -73,7 +71,7 @@ class BackSurface:
         return np.asarray(p - sum(bend.forward(s) for bend in self.bends), dtype=float)
 
 
-def back_before_chest(body: Volume, apex: Array, settings: BackSettings) -> BackSurface | None:
+def back_before_chest(body: Volume, apex: Floats, settings: BackSettings) -> BackSurface | None:
     """The back just in front of the corners between breast and chest, bent forward above and below.
 
     Args:
@@ -103,7 +101,7 @@ def back_before_chest(body: Volume, apex: Array, settings: BackSettings) -> Back
     return BackSurface(np.array([apex[0], 0.5 * (low + high)]), coefficients, (upper, lower))
 
 
-def _half_depth_extent(body: Volume, apex: Array, p: float, tilt: float) -> tuple[float, float]:
+def _half_depth_extent(body: Volume, apex: Floats, p: float, tilt: float) -> tuple[float, float]:
     """Lowest and highest s, mm, of the body's section by the tilted plane through (apex m, p) near the apex."""
     m = body.origin[0] + body.spacing[0] * np.arange(body.shape[0])
     plane = np.rint((p + tilt * (m - apex[0]) - body.origin[1]) / body.spacing[1]).astype(int)

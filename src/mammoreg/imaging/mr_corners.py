@@ -6,15 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Floats
 from mammoreg.geometry import Volume
-
-Array = NDArray[np.float64]
 
 CORNER_FULLNESS = 0.6
 """Share of a ball of some 20 mm that the body must fill at the corner between breast and chest."""
 
 
-def base_corners(body: Volume, apex: Array) -> tuple[Array | None, Array | None]:
+def base_corners(body: Volume, apex: Floats) -> tuple[Floats | None, Floats | None]:
     """Lateral and medial corner (m, p) between the breast and the chest, mm; None where there is none.
 
     In a corner the body fills more than half of a ball. Per axial slice near the apex the skin that is seen from the
@@ -38,7 +37,7 @@ def base_corners(body: Volume, apex: Array) -> tuple[Array | None, Array | None]
     return _corner(lateral, body, 0), _corner(medial, body, index[0])
 
 
-def _corner(score: NDArray[Any], body: Volume, first: int) -> Array | None:
+def _corner(score: NDArray[Any], body: Volume, first: int) -> Floats | None:
     """Median (m, p) over slices of the voxel with the best score, if at least half of the slices have one above 0."""
     flat = score.reshape(-1, score.shape[2])
     good = flat.max(axis=0, initial=0.0) > 0.0

@@ -7,11 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
+from mammoreg.arrays import Bools, Floats
 from mammoreg.geometry import Volume
-from mammoreg.imaging.mr_body import Mask
 from mammoreg.imaging.mr_chest_wall import BackSurface
-
-Array = NDArray[np.float64]
 
 STEP_MM = 3.0
 """The contrast is taken this far in front of and behind the surface."""
@@ -19,7 +17,7 @@ MIN_SCORE = 0.2
 """Mean contrast (at most 1) below which no muscle is seen."""
 
 
-def back_at_muscle(contrast: Volume, body: Mask, apex: Array, min_depth_mm: float) -> BackSurface:
+def back_at_muscle(contrast: Volume, body: Bools, apex: Floats, min_depth_mm: float) -> BackSurface:
     """Smooth surface with the breast's tissue in front and muscle behind, or the body's end in the volume.
 
     Args:
@@ -35,28 +33,28 @@ def back_at_muscle(contrast: Volume, body: Mask, apex: Array, min_depth_mm: floa
     end = float(contrast.origin[1] + contrast.spacing[1] * (np.flatnonzero(body.any(axis=(0, 2)))[-1] + 0.5))
     masked = np.where(body, contrast.data, 0.0).astype(np.float32)
 
-    def score(coefficients: Array) -> float:
+    def score(coefficients: Floats) -> float:
         p = BackSurface(centre, coefficients).posterior(m, s)
         return float(np.mean(_at(contrast, masked, m, p - STEP_MM, s) - _at(contrast, masked, m, p + STEP_MM, s))) / 2.0
 
     depths = np.arange(apex[1] + min_depth_mm, end, 2.0)
     slopes = (-0.2, -0.1, 0.0, 0.1, 0.2)
     trials = [np.array([p, a, b, 0.0, 0.0]) for p, a, b in itertools.product(depths, slopes, slopes)]
-    best: Array | None = max(trials, key=score, default=None)
+    best: Floats | None = max(trials, key=score, default=None)
     if best is None or score(best) < MIN_SCORE:
         return BackSurface(centre, np.array([end - contrast.spacing[1], 0.0, 0.0, 0.0, 0.0]))
     scale = np.array([2.0, 0.05, 0.05, 2e-3, 2e-3])
     simplex = best + np.vstack([np.zeros(5), np.diag(scale)])
     options: Any = {"initial_simplex": simplex, "maxiter": 300}
 
-    def negative(c: Array) -> float:
+    def negative(c: Floats) -> float:
         return -score(c)
 
     found = optimize.minimize(negative, best.tolist(), method="Nelder-Mead", options=options)
     return BackSurface(centre, np.asarray(found.x, dtype=float))
 
 
-def _at(grid: Volume, data: NDArray[np.float32], m: Array, p: Array, s: Array) -> Array:
+def _at(grid: Volume, data: NDArray[np.float32], m: Floats, p: Floats, s: Floats) -> Floats:
     """Samples at points given by their coordinates, mm; 0 outside the grid."""
     index = [(x - o) / h for x, o, h in zip((m, p, s), grid.origin, grid.spacing, strict=True)]
     return np.asarray(ndimage.map_coordinates(data, index, order=1, mode="constant"), dtype=float)

@@ -7,11 +7,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage import feature
 
+from mammoreg.arrays import Bools, Floats, Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
-from mammoreg.imaging.mr_body import Mask
-
-Map = NDArray[np.float64]
 
 FRONT_SHARE = 0.22
 """The nipple lies at most this share of the breast's depth behind the most anterior point, not further."""
@@ -20,7 +17,7 @@ DISTANCE_MM = 40.0
 
 
 def find_nipple(
-    volume: Volume, body: Mask, depth: NDArray[np.float32], fat_suppressed: bool, apex: Points, breast_depth: float
+    volume: Volume, body: Bools, depth: NDArray[np.float32], fat_suppressed: bool, apex: Points, breast_depth: float
 ) -> Points:
     """Place on the front of the breast, mm, that bulges most and has most duct-like tissue beneath.
 
@@ -51,7 +48,7 @@ def find_nipple(
     return np.array([m[i], p[i, k], s[k]])
 
 
-def _skin_index(body: Mask) -> Map:
+def _skin_index(body: Bools) -> Floats:
     """Fractional posterior index (m, s) of the body's first surface from the front; the grid's end without one."""
     soft = ndimage.gaussian_filter(body.astype(np.float32), 1.0, truncate=3.0)
     first = np.argmax(soft > 0.5, axis=1)
@@ -61,26 +58,26 @@ def _skin_index(body: Mask) -> Map:
     return np.asarray(np.where(inside > 0.5, crossing, body.shape[1] - 1.0))
 
 
-def _piece_at(front: Mask, volume: Volume, apex: Points) -> Mask:
+def _piece_at(front: Bools, volume: Volume, apex: Points) -> Bools:
     """The connected piece of a map (m, s) that holds the apex."""
     label, _ = ndimage.label(front)
     index = np.clip(np.rint(volume.to_index(apex)).astype(int), 0, np.array(volume.shape) - 1)
     return np.asarray(label == label[index[0], index[2]]) & front
 
 
-def _at_skin(values: NDArray[Any], skin: Map) -> Map:
+def _at_skin(values: NDArray[Any], skin: Floats) -> Floats:
     """Samples (m, s) of a volume at fractional posterior indices (m, s)."""
     i, k = np.indices(skin.shape)
     return np.asarray(ndimage.map_coordinates(values, [i, skin, k], order=1, mode="nearest"), dtype=float)
 
 
-def _bulge(body: Mask, spacing: NDArray[np.float64], skin: Map) -> Map:
+def _bulge(body: Bools, spacing: NDArray[np.float64], skin: Floats) -> Floats:
     """Share of a ball of some 10 mm around each skin point that is air, less a half."""
     full = ndimage.gaussian_filter(body.astype(np.float32), 6.0 / spacing, mode="nearest", truncate=2.5)
     return 0.5 - _at_skin(full, skin)
 
 
-def _below_skin(volume: Volume, depth: NDArray[np.float32], skin: Map) -> Map:
+def _below_skin(volume: Volume, depth: NDArray[np.float32], skin: Floats) -> Floats:
     """Mean intensity 2 to 8 mm below the skin near each skin point."""
     layer = ((depth > 2.0) & (depth < 8.0)).astype(np.float32)
     sigma = 3.0 / volume.spacing
@@ -89,7 +86,7 @@ def _below_skin(volume: Volume, depth: NDArray[np.float32], skin: Map) -> Map:
     return _at_skin(mean, skin + 5.0 / volume.spacing[1])
 
 
-def _spot(values: Map, front: Mask, spacing_mm: float) -> Map:
+def _spot(values: Floats, front: Bools, spacing_mm: float) -> Floats:
     """How much each point stands out in every direction: least downward curvature at 5 mm, in SDs of the front."""
     entries = feature.hessian_matrix(values, sigma=5.0 / spacing_mm, mode="nearest", use_gaussian_derivatives=True)
     least = -feature.hessian_matrix_eigvals(entries)[0]

@@ -7,19 +7,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Bools, Points
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
-from mammoreg.imaging.mr_body import Mask, body_mask
+from mammoreg.imaging.mr_body import body_mask
 from mammoreg.imaging.mr_breast import back_points, breast_mask
 from mammoreg.imaging.mr_chest_wall import BackSettings, BackSurface, back_before_chest
 from mammoreg.imaging.mr_grid import Box, block_mean, nearest_labels, working_volume
 from mammoreg.imaging.mr_muscle import back_at_muscle
 from mammoreg.imaging.mr_nipple import find_nipple
 from mammoreg.imaging.mr_side import BreastPlace, find_breast
-from mammoreg.imaging.mr_tissue import MUSCLE, SKIN, depth_below_skin, gland_threshold, is_fat_suppressed, label_tissues
+from mammoreg.imaging.mr_tissue import depth_below_skin, gland_threshold, is_fat_suppressed, label_tissues
+from mammoreg.labels import Label
 
-BiasField = Callable[[Volume, Mask], NDArray[np.float32]]
+BiasField = Callable[[Volume, Bools], NDArray[np.float32]]
 """Estimates the coil's smooth multiplicative field of a volume from the voxels of a mask."""
 
 COARSE_MM = 4.0
@@ -28,7 +29,7 @@ REACH_MM = np.array([90.0, 210.0, 110.0])
 MARGIN_MM = 18.0
 
 
-def no_bias(volume: Volume, mask: Mask) -> NDArray[np.float32]:
+def no_bias(volume: Volume, mask: Bools) -> NDArray[np.float32]:
     """The field of a coil without inhomogeneity."""
     return np.ones(volume.shape, dtype=np.float32)
 
@@ -56,7 +57,7 @@ class Segmentation:
 
     mr: Volume
     labels: NDArray[np.uint8]
-    breast: Mask
+    breast: Bools
     back: Points
     nipple: Points
     fat_suppressed: bool
@@ -81,7 +82,7 @@ def segment_volume(
     back = _find_back(grid, body, given, place.apex, settings)
     breast = breast_mask(body, grid, back, place.apex)
     if given is not None:
-        breast &= given != MUSCLE
+        breast &= given != Label.MUSCLE
     box = _box_around(breast, int(MARGIN_MM / settings.spacing_mm))
     grid, body, breast = _crop(grid, box), body[box], breast[box]
     corrected = grid.with_data(grid.data / bias_field(grid, breast))
@@ -90,7 +91,7 @@ def segment_volume(
     if given is None:
         tissues = label_tissues(corrected, body, breast, depth, suppressed)
     else:
-        tissues = np.where(body, np.where(given[box] == 0, SKIN, given[box]), 0).astype(np.uint8)
+        tissues = np.where(body, np.where(given[box] == 0, Label.SKIN, given[box]), 0).astype(np.uint8)
     reach = float(back.posterior(place.apex[0], place.apex[2]) - place.apex[1])
     nipple = find_nipple(corrected, body, depth, suppressed, place.apex, reach)
     return Segmentation(corrected, tissues, breast, back_points(breast, grid, back), nipple, suppressed)
@@ -106,7 +107,7 @@ def segment_body(volume: Volume, spacing_mm: float) -> Volume:
     return grid.with_data(body.astype(np.uint8))
 
 
-def locate_body(volume: Volume, labels: Volume | None, spacing_mm: float) -> tuple[Volume, Mask, BreastPlace]:
+def locate_body(volume: Volume, labels: Volume | None, spacing_mm: float) -> tuple[Volume, Bools, BreastPlace]:
     """Working grid around the breast of the wanted side, the body on it, and where the breast stands."""
     if not np.isfinite(volume.data).all():
         raise DataError("the MR volume holds values that are not finite (NaN or infinite): export it again")
@@ -129,7 +130,7 @@ def _box_of(place: BreastPlace) -> Box:
 
 
 def _find_back(
-    grid: Volume, body: Mask, given: NDArray[np.uint8] | None, apex: Points, settings: SegmentSettings
+    grid: Volume, body: Bools, given: NDArray[np.uint8] | None, apex: Points, settings: SegmentSettings
 ) -> BackSurface:
     """The back from the outline where the volume shows the torso, else from the muscle."""
     coarse = block_mean(grid.with_data(body.astype(np.float32)), 2.0 * settings.spacing_mm)
@@ -142,12 +143,12 @@ def _find_back(
         threshold = gland_threshold(grid.data[body & (depth > 4.0)], suppressed)
         fine = np.tanh((grid.data / threshold - 1.0) * 3.0) * (-1.0 if suppressed else 1.0)
     else:
-        fine = np.where(given == MUSCLE, -1.0, 1.0)
+        fine = np.where(given == Label.MUSCLE, -1.0, 1.0)
     contrast = block_mean(grid.with_data(fine.astype(np.float32)), 2.0 * settings.spacing_mm)
     return back_at_muscle(contrast, coarse.data > 0.5, apex, settings.back.min_depth_mm)
 
 
-def _box_around(breast: Mask, margin: int) -> tuple[slice, ...]:
+def _box_around(breast: Bools, margin: int) -> tuple[slice, ...]:
     """Slices around the breast with a margin in voxels, inside the grid."""
     (found,) = ndimage.find_objects(breast.astype(np.uint8))
     return tuple(slice(max(s.start - margin, 0), s.stop + margin) for s in found)

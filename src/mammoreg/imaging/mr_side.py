@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
+from mammoreg.arrays import Bools
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from mammoreg.imaging.mr_body import Mask
 
 HILL_MM = 15.0
 """A hill of the body lower than this is no breast."""
@@ -26,7 +26,7 @@ class BreastPlace:
     midline_m: float
 
 
-def find_breast(body: Mask, grid: Volume) -> BreastPlace:
+def find_breast(body: Bools, grid: Volume) -> BreastPlace:
     """Find the breast of the wanted side in a coarse body mask of the breast frame.
 
     The body's anterior relief, seen along the superior axis, is one hill or two; of two, the wanted one is the lateral
@@ -61,7 +61,7 @@ def _wanted_hill(profile: NDArray[np.float64], m: NDArray[np.float64], peaks: ND
     return highest
 
 
-def _apex(relief: NDArray[np.float64], body: Mask, grid: Volume, hill: int) -> NDArray[np.float64]:
+def _apex(relief: NDArray[np.float64], body: Bools, grid: Volume, hill: int) -> NDArray[np.float64]:
     """The most anterior point within a few voxels of a hill's ridge, mm."""
     first = max(hill - 3, 0)
     strip = ndimage.gaussian_filter(relief[first : hill + 4], 1.0)
@@ -70,7 +70,7 @@ def _apex(relief: NDArray[np.float64], body: Mask, grid: Volume, hill: int) -> N
     return grid.to_world(np.array([m, int(np.argmax(body[m, :, s])), s]))
 
 
-def _relief(body: Mask, grid: Volume) -> NDArray[np.float64]:
+def _relief(body: Bools, grid: Volume) -> NDArray[np.float64]:
     """Height (m, s) in mm of the body's first voxel from the front above the grid's posterior end."""
     first = np.where(body.any(axis=1), np.argmax(body, axis=1), body.shape[1])
     return np.asarray((body.shape[1] - first) * grid.spacing[1], dtype=float)

@@ -5,11 +5,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.filters import threshold_otsu
 
+from mammoreg.arrays import Bools
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from mammoreg.imaging.mr_body import Mask
+from mammoreg.labels import Label
 
-BACKGROUND, FAT, GLAND, SKIN, MUSCLE = range(5)
 SKIN_MM = 1.5
 """Thickness of the skin label: breast skin measures 1.5 mm on average (Huang et al., Med Phys 2008)."""
 BLUR_MM = 3.0
@@ -18,13 +18,13 @@ OUTLIER_SPANS = 4.0
 """Intensities further from the median than this many spans (median to 5th percentile of fat's side) are cut to it."""
 
 
-def depth_below_skin(body: Mask, spacing: NDArray[np.float64]) -> NDArray[np.float32]:
+def depth_below_skin(body: Bools, spacing: NDArray[np.float64]) -> NDArray[np.float32]:
     """Distance in mm of each body voxel's centre from the air's border; the grid's faces are no border."""
     distance = ndimage.distance_transform_edt(np.pad(body, 1, mode="edge"), sampling=spacing)[1:-1, 1:-1, 1:-1]
     return np.asarray(np.maximum(distance - 0.5 * spacing[0], 0.0) * body, dtype=np.float32)
 
 
-def is_fat_suppressed(intensity: NDArray[np.float32], depth: NDArray[np.float32], breast: Mask) -> bool:
+def is_fat_suppressed(intensity: NDArray[np.float32], depth: NDArray[np.float32], breast: Bools) -> bool:
     """Tell from the image whether fat is dark.
 
     In units of the contrast between the two classes of the interior (0 the dark, 1 the bright one): with suppression
@@ -62,7 +62,7 @@ def gland_threshold(samples: NDArray[np.float32], fat_suppressed: bool) -> float
 
 
 def label_tissues(
-    volume: Volume, body: Mask, breast: Mask, depth: NDArray[np.float32], fat_suppressed: bool
+    volume: Volume, body: Bools, breast: Bools, depth: NDArray[np.float32], fat_suppressed: bool
 ) -> NDArray[np.uint8]:
     """Label map: fat, gland and skin in the breast; all of the body behind it counts as muscle/chest wall.
 
@@ -72,8 +72,8 @@ def label_tissues(
     deep = breast & (depth > BLUR_MM)
     gland = deep & ((volume.data > gland_threshold(volume.data[deep], fat_suppressed)) == fat_suppressed)
     labels = np.zeros(body.shape, np.uint8)
-    labels[body] = MUSCLE
-    labels[breast] = SKIN
-    labels[inner] = FAT
-    labels[gland] = GLAND
+    labels[body] = Label.MUSCLE
+    labels[breast] = Label.SKIN
+    labels[inner] = Label.FAT
+    labels[gland] = Label.GLAND
     return labels

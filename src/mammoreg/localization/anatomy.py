@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.arrays import Points
+from mammoreg.geometry.frames import Laterality
 
 _CENTRAL_MM = 5.0
 

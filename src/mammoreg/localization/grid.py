@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import MethodView
 
 Cells = NDArray[np.intp]

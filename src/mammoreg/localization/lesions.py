@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, lps_to_breast
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 
 _MOST_POINTS = 20_000
 _FINEST_STEP_MM = 0.25

@@ -6,15 +6,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage, optimize
 from scipy.spatial.transform import Rotation
 
+from mammoreg.arrays import Floats, Points
 from mammoreg.geometry import Volume, plate_to_breast
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import AffineDeformation, MethodView
 
-Floats = NDArray[np.float64]
 _ROBUST_MM = 2.0
 _RIGID_BASE_MM = 1.0  # about a voxel of the working grid
 _TURN_RAD = 0.02  # moves a breast's skin about as far as 1 mm does

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import MethodView
 from mammoreg.localization.lesions import LesionArea, LesionBody
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.grid import BreastGrid, BreastInView, Cells
 from mammoreg.localization.lesions import LesionArea
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.materials.fibres import Fibres
-from mammoreg.materials.isochoric import Array, IsochoricLaw
+from mammoreg.materials.isochoric import IsochoricLaw
 from mammoreg.materials.mixture import TissueMixture
 from mammoreg.materials.neo_hookean import NeoHookean
 from mammoreg.materials.uniaxial import UniaxialLaw
@@ -35,8 +36,8 @@ class ElasticMaterial:
             term of curvature to compute.
     """
 
-    mu_kpa: Array
-    bulk_kpa: Array
+    mu_kpa: Floats
+    bulk_kpa: Floats
     fibres: Fibres | None = None
     law: IsochoricLaw | TissueMixture | None = None
 
@@ -59,7 +60,7 @@ class ElasticMaterial:
         fibres = None if self.fibres is None else self.fibres.part(elements)
         return ElasticMaterial(self.mu_kpa[elements], self.bulk_kpa[elements], fibres, law)
 
-    def reached_mu_kpa(self, compression: float) -> Array:
+    def reached_mu_kpa(self, compression: float) -> Floats:
         """Shear modulus that elements (E,) have reached at a uniaxial compression, a third of the slope of the stress.
 
         The scale for what must hold against laws that stiffen by orders of magnitude, as a contact's penalty. The
@@ -75,10 +76,10 @@ class ElasticMaterial:
 
 
 def neo_hookean(
-    mu_kpa: float | Array,
+    mu_kpa: float | Floats,
     poisson: float = 0.495,
-    fibre: Array | None = None,
-    fibre_kpa: float | Array | None = None,
+    fibre: Floats | None = None,
+    fibre_kpa: float | Floats | None = None,
     stiffening: float = 0.0,
 ) -> ElasticMaterial:
     """Neo-Hookean material whose bulk modulus follows from Poisson's ratio.
@@ -96,7 +97,7 @@ def neo_hookean(
 def hyperelastic(
     law: IsochoricLaw | TissueMixture,
     poisson: float = 0.495,
-    bulk_kpa: float | Array | None = None,
+    bulk_kpa: float | Floats | None = None,
     fibres: Fibres | None = None,
 ) -> ElasticMaterial:
     """Material of any isochoric law, or of a mixture of tissues.

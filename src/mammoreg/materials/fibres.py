@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.materials.isochoric import Array
+from mammoreg.arrays import Floats
 
 _LARGEST_EXPONENT = 5.0
 
@@ -22,8 +22,8 @@ class Fibres:
         stiffening: k2, the same for all elements, not negative.
     """
 
-    direction: Array
-    stiffness_kpa: float | Array
+    direction: Floats
+    stiffness_kpa: float | Floats
     stiffening: float = 0.0
 
     def of_elements(self, count: int) -> "Fibres":
@@ -46,7 +46,7 @@ class Fibres:
         stiffness = np.asarray(self.stiffness_kpa)[elements]
         return Fibres(self.direction[elements], stiffness, self.stiffening)
 
-    def energy_kpa(self, i4: Array) -> Array:
+    def energy_kpa(self, i4: Floats) -> Floats:
         """W4 at I4bar (E, Q)."""
         beyond = np.maximum(i4 - 1.0, 0.0)
         if self.stiffening == 0.0:
@@ -57,7 +57,7 @@ class Fibres:
         further = beyond - held
         return np.asarray(self._constant * (energy + slope * further + 0.5 * curvature * further**2))
 
-    def slope_kpa(self, i4: Array) -> Array:
+    def slope_kpa(self, i4: Floats) -> Floats:
         """dW4 / dI4bar at I4bar (E, Q)."""
         beyond = np.where(i4 > 1.0, i4 - 1.0, 0.0)
         if self.stiffening == 0.0:
@@ -66,7 +66,7 @@ class Fibres:
         slope, curvature = self._derivatives(held)
         return np.asarray(self._constant * (slope + curvature * (beyond - held)))
 
-    def curvature_kpa(self, i4: Array) -> Array:
+    def curvature_kpa(self, i4: Floats) -> Floats:
         """d2W4 / dI4bar^2 at I4bar (E, Q)."""
         tension = i4 > 1.0
         if self.stiffening == 0.0:
@@ -75,14 +75,14 @@ class Fibres:
         return np.asarray(self._constant * self._derivatives(held)[1] * tension)
 
     @property
-    def _constant(self) -> Array:
+    def _constant(self) -> Floats:
         return np.asarray(self.stiffness_kpa, dtype=float)[:, None]
 
     @property
     def _largest(self) -> float:
         return float(np.sqrt(_LARGEST_EXPONENT / self.stiffening))
 
-    def _derivatives(self, beyond: Array) -> tuple[Array, Array]:
+    def _derivatives(self, beyond: Floats) -> tuple[Floats, Floats]:
         """First and second derivative of the energy over k1."""
         square = self.stiffening * beyond**2
         growth = np.exp(square)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mammoreg.arrays import Floats
 from mammoreg.materials.exponential import Exponential
-from mammoreg.materials.isochoric import Array
 from mammoreg.materials.uniaxial import UniaxialLaw
 
 EARLIEST_ONSET = 0.21
@@ -46,21 +46,21 @@ class HardenedFat(UniaxialLaw):
         if stiffer.size:
             raise ValueError(f"fat becomes stiffer than gland at {stiffer[0]:.1%}: choose softer ligaments")
 
-    def stress_kpa(self, compression: ArrayLike) -> Array:
+    def stress_kpa(self, compression: ArrayLike) -> Floats:
         """Nominal stress at compressions of any shape."""
         return self.fat.stress_kpa(compression) + self._ligaments.stress_kpa(self._beyond(compression))
 
-    def tangent_kpa(self, compression: ArrayLike) -> Array:
+    def tangent_kpa(self, compression: ArrayLike) -> Floats:
         """Slope of the stress; it jumps by b at the onset."""
         taut = np.asarray(compression, dtype=float) > self.onset
         ligaments = self._ligaments.tangent_kpa(self._beyond(compression))
         return self.fat.tangent_kpa(compression) + np.where(taut, ligaments, 0.0)
 
-    def work_kpa(self, compression: ArrayLike) -> Array:
+    def work_kpa(self, compression: ArrayLike) -> Floats:
         """Integral of the stress."""
         return self.fat.work_kpa(compression) + self._ligaments.work_kpa(self._beyond(compression))
 
-    def _beyond(self, compression: ArrayLike) -> Array:
+    def _beyond(self, compression: ArrayLike) -> Floats:
         return np.asarray(np.maximum(np.asarray(compression, dtype=float) - self.onset, 0.0))
 
     @property

@@ -2,10 +2,7 @@
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from mammoreg.arrays import Floats
 
 
 class IsochoricLaw(Protocol):
@@ -15,13 +12,13 @@ class IsochoricLaw(Protocol):
     2 W' dev(bbar), and W'' adds 4 W'' dev(bbar) x dev(bbar) to its tangent.
     """
 
-    def energy_kpa(self, i1: Array) -> Array:
+    def energy_kpa(self, i1: Floats) -> Floats:
         """W(I1bar), zero at 3."""
 
-    def slope_kpa(self, i1: Array) -> Array:
+    def slope_kpa(self, i1: Floats) -> Floats:
         """W' = dW / dI1bar, positive."""
 
-    def curvature_kpa(self, i1: Array) -> Array:
+    def curvature_kpa(self, i1: Floats) -> Floats:
         """W'' = d2W / dI1bar^2."""
 
     @property

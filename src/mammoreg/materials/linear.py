@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mammoreg.materials.isochoric import Array
+from mammoreg.arrays import Floats
 from mammoreg.materials.uniaxial import UniaxialLaw
 
 
@@ -24,14 +24,14 @@ class Linear(UniaxialLaw):
         """The paper's 50 %."""
         return 0.5
 
-    def stress_kpa(self, compression: ArrayLike) -> Array:
+    def stress_kpa(self, compression: ArrayLike) -> Floats:
         """Nominal stress at compressions of any shape."""
         return np.asarray(self.e_kpa * np.asarray(compression, dtype=float))
 
-    def tangent_kpa(self, compression: ArrayLike) -> Array:
+    def tangent_kpa(self, compression: ArrayLike) -> Floats:
         """The modulus."""
         return np.full(np.shape(compression), self.e_kpa)
 
-    def work_kpa(self, compression: ArrayLike) -> Array:
+    def work_kpa(self, compression: ArrayLike) -> Floats:
         """Integral of the stress."""
         return np.asarray(0.5 * self.e_kpa * np.asarray(compression, dtype=float) ** 2)

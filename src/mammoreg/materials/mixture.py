@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.materials.isochoric import Array, IsochoricLaw
+from mammoreg.arrays import Floats
+from mammoreg.materials.isochoric import IsochoricLaw
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class TissueMixture:
     """
 
     laws: tuple[IsochoricLaw, ...]
-    fractions: Array
+    fractions: Floats
 
     def __post_init__(self) -> None:
         if self.fractions.ndim != 2 or self.fractions.shape[1] != len(self.laws):
@@ -34,7 +35,7 @@ class TissueMixture:
             raise ValueError(f"element {wrong[0]}: fractions of tissue must not be negative and add up to 1")
 
     @property
-    def mu_kpa(self) -> Array:
+    def mu_kpa(self) -> Floats:
         """Initial shear modulus (E,)."""
         return np.asarray(self.fractions @ np.array([law.mu_kpa for law in self.laws]))
 
@@ -42,19 +43,19 @@ class TissueMixture:
         """The mixture of some elements."""
         return TissueMixture(self.laws, self.fractions[elements])
 
-    def energy_kpa(self, i1: Array) -> Array:
+    def energy_kpa(self, i1: Floats) -> Floats:
         """W at I1bar (E, Q)."""
         return self._sum([law.energy_kpa for law in self.laws], i1)
 
-    def slope_kpa(self, i1: Array) -> Array:
+    def slope_kpa(self, i1: Floats) -> Floats:
         """W' at I1bar (E, Q)."""
         return self._sum([law.slope_kpa for law in self.laws], i1)
 
-    def curvature_kpa(self, i1: Array) -> Array:
+    def curvature_kpa(self, i1: Floats) -> Floats:
         """W'' at I1bar (E, Q)."""
         return self._sum([law.curvature_kpa for law in self.laws], i1)
 
-    def _sum(self, functions: list[Callable[[Array], Array]], i1: Array) -> Array:
+    def _sum(self, functions: list[Callable[[Floats], Floats]], i1: Floats) -> Floats:
         """A tissue costs nothing where it has none."""
         total = np.zeros(i1.shape)
         for fraction, function in zip(self.fractions.T, functions, strict=True):

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from mammoreg.materials.isochoric import Array
+from mammoreg.arrays import Floats
 from mammoreg.materials.uniaxial import UniaxialLaw
 
 
@@ -41,22 +41,22 @@ class Tabulated(UniaxialLaw):
         """The table's last compression."""
         return self.compressions[-1]
 
-    def stress_kpa(self, compression: ArrayLike) -> Array:
+    def stress_kpa(self, compression: ArrayLike) -> Floats:
         """Nominal stress at compressions of any shape; beyond the table by its last slope."""
         inside, beyond = self._split(compression)
         return np.asarray(self._curve(inside) + self._curve(inside, 1) * beyond)
 
-    def tangent_kpa(self, compression: ArrayLike) -> Array:
+    def tangent_kpa(self, compression: ArrayLike) -> Floats:
         """Slope of the stress."""
         return np.asarray(self._curve(self._split(compression)[0], 1))
 
-    def work_kpa(self, compression: ArrayLike) -> Array:
+    def work_kpa(self, compression: ArrayLike) -> Floats:
         """Integral of the stress."""
         inside, beyond = self._split(compression)
         further = self._curve(inside) * beyond + 0.5 * self._curve(inside, 1) * beyond**2
         return np.asarray(self._curve.antiderivative()(inside) + further)
 
-    def _split(self, compression: ArrayLike) -> tuple[Array, Array]:
+    def _split(self, compression: ArrayLike) -> tuple[Floats, Floats]:
         compression = np.asarray(compression, dtype=float)
         inside = np.minimum(compression, self.limit)
         return inside, compression - inside

@@ -4,15 +4,14 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.materials.catalogue import CATALOGUE
 from mammoreg.materials.elastic import ElasticMaterial, hyperelastic, neo_hookean, tangent_bulk_kpa
 from mammoreg.materials.fibres import Fibres
 from mammoreg.materials.laws import Law
 from mammoreg.materials.mixture import TissueMixture
 
-Floats = NDArray[np.float64]
 PaperMaterial = Literal["wellman", "azar", "samani", "homogeneous", "krouskop", "bakic", "lorenzen"]
 MaterialName = PaperMaterial | Literal["fat_and_gland"]
 MATERIALS: tuple[PaperMaterial, ...] = get_args(PaperMaterial)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from mammoreg.materials.isochoric import Array
+from mammoreg.arrays import Floats
 
 LIMIT = 0.6
 LEAST_SHEAR = 0.02
@@ -46,16 +46,16 @@ class ShearLine:
     stress: float
     tangent: float
 
-    def energy_kpa(self, shear: Array) -> Array:
+    def energy_kpa(self, shear: Floats) -> Floats:
         """W at shears."""
         further = shear - self.shear
         return np.asarray(self.energy + self.stress * further + 0.5 * self.tangent * further**2)
 
-    def slope_kpa(self, shear: Array) -> Array:
+    def slope_kpa(self, shear: Floats) -> Floats:
         """W' at shears."""
         return np.asarray(0.5 * (self.tangent + self._offset / shear))
 
-    def curvature_kpa(self, shear: Array) -> Array:
+    def curvature_kpa(self, shear: Floats) -> Floats:
         """W'' at shears."""
         return np.asarray(-0.25 * self._offset / shear**3)
 
@@ -78,15 +78,15 @@ class UniaxialLaw(ABC):
         return LIMIT
 
     @abstractmethod
-    def stress_kpa(self, compression: ArrayLike) -> Array:
+    def stress_kpa(self, compression: ArrayLike) -> Floats:
         """Nominal stress (force over undeformed area), positive, at engineering compressions of any shape."""
 
     @abstractmethod
-    def tangent_kpa(self, compression: ArrayLike) -> Array:
+    def tangent_kpa(self, compression: ArrayLike) -> Floats:
         """Slope of the nominal stress."""
 
     @abstractmethod
-    def work_kpa(self, compression: ArrayLike) -> Array:
+    def work_kpa(self, compression: ArrayLike) -> Floats:
         """Integral of the nominal stress from 0."""
 
     @cached_property
@@ -98,7 +98,7 @@ class UniaxialLaw(ABC):
     def exact_to(self) -> float:
         """Compression up to which the law is followed exactly."""
 
-        def reserve(compression: Array) -> Array:
+        def reserve(compression: Floats) -> Floats:
             return self._shear_tangent(compression) - LEAST_SHEAR * self.mu_kpa
 
         samples = np.linspace(0.0, self.limit, _SAMPLES)
@@ -125,23 +125,23 @@ class UniaxialLaw(ABC):
         stiffest = max(last.tangent, last.stress / last.shear)
         return (*found, ShearLine(last.compression, last.shear, last.energy, last.stress, stiffest))
 
-    def energy_kpa(self, i1: Array) -> Array:
+    def energy_kpa(self, i1: Floats) -> Floats:
         """W(I1bar)."""
         compression, shear = _equivalents(i1)
         return self._continued(self.work_kpa(np.minimum(compression, self.exact_to)), compression, shear, "energy_kpa")
 
-    def slope_kpa(self, i1: Array) -> Array:
+    def slope_kpa(self, i1: Floats) -> Floats:
         """W'(I1bar)."""
         compression, shear = _equivalents(i1)
         return self._continued(self._slope(np.minimum(compression, self.exact_to)), compression, shear, "slope_kpa")
 
-    def curvature_kpa(self, i1: Array) -> Array:
+    def curvature_kpa(self, i1: Floats) -> Floats:
         """W''(I1bar)."""
         compression, shear = _equivalents(i1)
         exact = self._curvature(np.minimum(compression, self.exact_to))
         return self._continued(exact, compression, shear, "curvature_kpa")
 
-    def _continued(self, values: Array, compression: Array, shear: Array, quantity: str) -> Array:
+    def _continued(self, values: Floats, compression: Floats, shear: Floats, quantity: str) -> Floats:
         """Values of the exact law replaced by those of the lines where these hold."""
         values = np.array(values)
         for line in self.lines:
@@ -150,12 +150,12 @@ class UniaxialLaw(ABC):
                 values[beyond] = getattr(line, quantity)(shear[beyond])
         return values
 
-    def _slope(self, compression: Array) -> Array:
+    def _slope(self, compression: Floats) -> Floats:
         """W' as a function of the compression."""
         compression = np.maximum(compression, _AT_REST)
         return np.asarray(self.stress_kpa(compression) / compression * _strain_ratio(1.0 - compression))
 
-    def _curvature(self, compression: Array) -> Array:
+    def _curvature(self, compression: Floats) -> Floats:
         """W'' as a function of the compression: (dW'/de) / (dI1/de)."""
         compression = np.maximum(compression, _NEAR_REST)
         stretch = 1.0 - compression
@@ -166,23 +166,23 @@ class UniaxialLaw(ABC):
         rate = -0.5 * stretch * (2.0 + stretch) / (1.0 + stretch + stretch**2) ** 2
         return np.asarray((bend * ratio + secant * rate) * ratio / compression)
 
-    def _shear_tangent(self, compression: Array) -> Array:
+    def _shear_tangent(self, compression: Floats) -> Floats:
         """Slope of the shear stress over the shear whose I1 is that of a compression."""
         shear = simple_shear(compression)
         return np.asarray(2.0 * self._slope(compression) + 4.0 * shear**2 * self._curvature(compression))
 
 
-def uniaxial_compression(i1: Array) -> Array:
+def uniaxial_compression(i1: Floats) -> Floats:
     """Compression e = 1 - l of the root l in (0, 1] of I1 = l^2 + 2/l, in closed form; I1 below 3 counts as 3."""
     return _equivalents(i1)[0]
 
 
-def simple_shear(compression: Array) -> Array:
+def simple_shear(compression: Floats) -> Floats:
     """Simple shear g of the same I1 = 3 + g^2 as a uniaxial compression."""
     return np.asarray(compression * np.sqrt((3.0 - compression) / (1.0 - compression)))
 
 
-def _equivalents(i1: Array) -> tuple[Array, Array]:
+def _equivalents(i1: Floats) -> tuple[Floats, Floats]:
     """Uniaxial compression and simple shear of the same I1.
 
     The cubic's trigonometric root, arranged so that nothing cancels near I1 = 3.
@@ -195,6 +195,6 @@ def _equivalents(i1: Array) -> tuple[Array, Array]:
     return np.maximum(-stretch_less_one, 0.0), np.sqrt(excess)
 
 
-def _strain_ratio(stretch: Array) -> Array:
+def _strain_ratio(stretch: Floats) -> Floats:
     """Ratio e / (2 (l^-2 - l)) without its 0/0 at rest."""
     return np.asarray(0.5 * stretch**2 / (1.0 + stretch + stretch**2))

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.trilinear import shape_functions
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -30,12 +28,12 @@ class BlockMesh:
         if self.points.shape != ((self.n + 1) ** 3, 3):
             raise ValueError(f"{self.n} elements a side need {(self.n + 1) ** 3} points, got {self.points.shape}")
 
-    def node_grid(self) -> Indices:
+    def node_grid(self) -> Integers:
         """Node numbers as an array indexed [i, j, k], shape (n + 1, n + 1, n + 1)."""
         m = self.n + 1
         return np.arange(m**3).reshape(m, m, m).transpose(2, 1, 0)
 
-    def hexes(self) -> Indices:
+    def hexes(self) -> Integers:
         """Connectivity (n^3, 8) in VTK order; element (a, b, c) has the number a + n (b + n c)."""
         grid = self.node_grid()
         low, high = slice(None, -1), slice(1, None)
@@ -43,11 +41,11 @@ class BlockMesh:
         cells = [grid[i, j, k] for k in (low, high) for i, j in corners]
         return np.stack([cell.ravel(order="F") for cell in cells], axis=1)
 
-    def back_nodes(self) -> Indices:
+    def back_nodes(self) -> Integers:
         """Nodes ((n + 1)^2,) of the back face (k = 0), rim included."""
         return self.node_grid()[:, :, 0].ravel(order="F")
 
-    def skin_nodes(self) -> Indices:
+    def skin_nodes(self) -> Integers:
         """Sorted nodes of the five faces other than the back; the back's rim is among them."""
         return np.unique(self.skin_quads())
 
@@ -57,13 +55,13 @@ class BlockMesh:
         inside[np.intersect1d(self.skin_nodes(), self.back_nodes())] = True
         return inside
 
-    def skin_quads(self) -> Indices:
+    def skin_quads(self) -> Integers:
         """Quadrilaterals (5 n^2, 4) of the skin with outward normals: -i, +i, -j, +j faces and the cap."""
         grid = self.node_grid()
         faces = [grid[0].T, grid[-1], grid[:, 0], grid[:, -1].T, grid[:, :, -1]]
         return np.concatenate([_quads(face) for face in faces])
 
-    def back_quads(self) -> Indices:
+    def back_quads(self) -> Integers:
         """Quadrilaterals (n^2, 4) of the back face with outward normals."""
         return _quads(self.node_grid()[:, :, 0].T)
 
@@ -87,7 +85,7 @@ class BlockMesh:
         return np.asarray(fine.points[fine.skin_nodes()])
 
 
-def _quads(face: Indices) -> Indices:
+def _quads(face: Integers) -> Integers:
     """Quadrilaterals of a face of nodes [u, v]; normals along u x v."""
     corners = [face[:-1, :-1], face[1:, :-1], face[1:, 1:], face[:-1, 1:]]
     return np.stack([corner.ravel() for corner in corners], axis=1)

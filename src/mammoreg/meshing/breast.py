@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 from mammoreg.geometry import Volume
 from mammoreg.meshing.block import BlockMesh
@@ -14,8 +14,6 @@ from mammoreg.meshing.meridians import skin_meridians
 from mammoreg.meshing.quality import MeshQuality, mesh_quality
 from mammoreg.meshing.relax import SquaredTerms, relax
 from mammoreg.meshing.surface import BreastSurface, breast_surface
-
-Floats = NDArray[np.float64]
 
 _ROUNDS = 10
 _ITERATIONS_A_ROUND = 40

@@ -1,17 +1,15 @@
 """Quadratic terms of the relaxation: fit of the faces to the surface, evenness of the grid lines."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.relax import SquaredTerms
 from mammoreg.meshing.surface import BreastSurface, OrientedCloud
 from mammoreg.meshing.trilinear import shape_functions, shape_gradients
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
-
+# All chosen: how much each squared term counts.
 _FIT_WEIGHT = 30.0
 _CURVING_WEIGHT = 1.0
 _KINK_WEIGHT = 10.0
@@ -51,7 +49,7 @@ def anchor(mesh: BlockMesh, cell: Floats) -> SquaredTerms:
     return SquaredTerms(matrix, mesh.points.ravel()).scaled(weight)
 
 
-def _differences(grid: Indices, axis: int, stencil: Floats) -> SquaredTerms:
+def _differences(grid: Integers, axis: int, stencil: Floats) -> SquaredTerms:
     """Finite differences of the node positions along one axis of the block."""
     runs = grid.shape[axis] - len(stencil) + 1
     nodes = np.stack([grid.take(range(s, s + runs), axis=axis).ravel() for s in range(len(stencil))], axis=1)
@@ -63,7 +61,7 @@ def _differences(grid: Indices, axis: int, stencil: Floats) -> SquaredTerms:
     return SquaredTerms(matrix, np.zeros(matrix.shape[0]))
 
 
-def _face_fit(mesh: BlockMesh, quads: Indices, cloud: OrientedCloud) -> SquaredTerms:
+def _face_fit(mesh: BlockMesh, quads: Integers, cloud: OrientedCloud) -> SquaredTerms:
     """Distances of 3 x 3 points of each quadrilateral from the tangent planes of a cloud."""
     side = np.array([-2.0, 0.0, 2.0]) / 3.0
     u, v = np.meshgrid(side, side, indexing="ij")

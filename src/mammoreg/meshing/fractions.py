@@ -1,14 +1,12 @@
 """Share of a tissue in each element."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.geometry import Volume
 from mammoreg.labels import BREAST, Label
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import jacobians, shape_functions
-
-Floats = NDArray[np.float64]
 
 _SAMPLES_A_SIDE = 6
 

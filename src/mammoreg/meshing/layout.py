@@ -5,11 +5,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.meridians import Meridians
 from mammoreg.meshing.transfinite import fill_block, fill_face
-
-Floats = NDArray[np.float64]
 
 _EDGE_ANGLES = np.deg2rad([-135.0, -45.0, 45.0, 135.0])
 _EDGE_WINDOW = np.deg2rad(40.0)

@@ -4,10 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.trilinear import CORNERS, shape_functions
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _EXTRAPOLATION = 1.5
 _SAMPLES_A_SIDE = 4
@@ -22,7 +20,7 @@ class Locator:
     the trilinear map for all points at once.
     """
 
-    def __init__(self, mesh_points: Floats, hexes: Indices) -> None:
+    def __init__(self, mesh_points: Floats, hexes: Integers) -> None:
         """Prepare a mesh of nodes (M, 3), mm, and hexahedra (E, 8) in VTK order."""
         nodes = np.asarray(mesh_points, dtype=float)[hexes]
         self._coefficients = _monomial_coefficients(nodes)
@@ -33,7 +31,7 @@ class Locator:
         # No point inside an element is farther than this from its samples, however skewed it is.
         self._reach = 2.0 / _SAMPLES_A_SIDE * float(np.linalg.norm(np.ptp(nodes, axis=1), axis=1).max())
 
-    def locate(self, points: Floats) -> tuple[Indices, Floats, NDArray[np.bool_]]:
+    def locate(self, points: Floats) -> tuple[Integers, Floats, NDArray[np.bool_]]:
         """Element (N,), local coordinates (N, 3) and whether it lies inside (N,) for each of points (N, 3) in mm.
 
         Points outside get the nearest element, with local coordinates extrapolated up to 1.5 times its half width.
@@ -49,16 +47,16 @@ class Locator:
             inside[rest] = self._holds(points[rest], element[rest], local[rest])
         return element, np.clip(local, -_EXTRAPOLATION, _EXTRAPOLATION), inside
 
-    def _candidate(self, sample: Indices) -> tuple[Indices, Floats]:
+    def _candidate(self, sample: Integers) -> tuple[Integers, Floats]:
         """Element and local coordinates of numbered samples."""
         per_element = len(self._samples)
         return sample // per_element, self._samples[sample % per_element].copy()
 
-    def _holds(self, points: Floats, element: Indices, local: Floats) -> NDArray[np.bool_]:
+    def _holds(self, points: Floats, element: Integers, local: Floats) -> NDArray[np.bool_]:
         """Whether the element itself comes to the point (Newton may have stopped outside, or elsewhere)."""
         return self._distance(points, element, local) < _TOLERANCE_MM
 
-    def _best_of_candidates(self, points: Floats, element: Indices, local: Floats) -> tuple[Indices, Floats]:
+    def _best_of_candidates(self, points: Floats, element: Integers, local: Floats) -> tuple[Integers, Floats]:
         """Try the elements of further near samples; keep for each point the one that comes nearest to it."""
         best_element, best_local = element.copy(), local.copy()
         gap = self._distance(points, element, local)
@@ -77,12 +75,12 @@ class Locator:
             best_element[chosen], best_local[chosen], gap[chosen] = tried[better], found[better], distance[better]
         return best_element, best_local
 
-    def _distance(self, points: Floats, element: Indices, local: Floats) -> Floats:
+    def _distance(self, points: Floats, element: Integers, local: Floats) -> Floats:
         """Distance from the points to the element's own part of the extrapolated map."""
         position, _ = _evaluate(self._coefficients[element], np.clip(local, -1.0, 1.0))
         return np.asarray(np.linalg.norm(points - position, axis=1))
 
-    def _invert(self, points: Floats, element: Indices, start: Floats) -> Floats:
+    def _invert(self, points: Floats, element: Integers, start: Floats) -> Floats:
         """Newton's method for local coordinates, kept within the cube of half width 3."""
         local = start.copy()
         active = np.arange(len(points))
@@ -96,7 +94,7 @@ class Locator:
         return local
 
 
-def interpolate(hexes: Indices, element: Indices, local: Floats, nodal_values: Floats) -> Floats:
+def interpolate(hexes: Integers, element: Integers, local: Floats, nodal_values: Floats) -> Floats:
     """Values (N, ...) of a nodal field (M, ...) at the places that `Locator.locate` returned."""
     values = np.asarray(nodal_values, dtype=float)
     flat = values.reshape(len(values), -1)

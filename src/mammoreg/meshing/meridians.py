@@ -3,18 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import LinearNDInterpolator
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.errors import DataError
 from mammoreg.meshing.surface import BreastSurface, triangle_edges
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Largest distance of the pole from the apex, as a share of the radius of a half sphere of the skin's area.
 _POLE_REACH = 0.25
@@ -84,7 +81,7 @@ def _pole(lift: LinearNDInterpolator, apex: Floats, nipple: Floats, reach: float
     return np.asarray(line[np.searchsorted(way, reach)])
 
 
-def _map_to_disc(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
+def _map_to_disc(vertices: Floats, triangles: Integers) -> tuple[Floats, Floats]:
     """Harmonic map (V, 2) with the rim at its angles around the rim's middle on the unit circle, and the apex (2,).
 
     The apex is where the solution of Poisson's equation, zero at the rim, is largest: far from the rim on all sides.
@@ -107,18 +104,18 @@ def _map_to_disc(vertices: Floats, triangles: Indices) -> tuple[Floats, Floats]:
     return disc, disc[free][top].mean(axis=0)
 
 
-def _area(vertices: Floats, triangles: Indices) -> float:
+def _area(vertices: Floats, triangles: Integers) -> float:
     return float(_vertex_areas(vertices, triangles).sum())
 
 
-def _vertex_areas(vertices: Floats, triangles: Indices) -> Floats:
+def _vertex_areas(vertices: Floats, triangles: Integers) -> Floats:
     a, b, c = (vertices[triangles[:, corner]] for corner in range(3))
     third = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
     areas = np.bincount(triangles.ravel(), np.repeat(third, 3), minlength=len(vertices))
     return np.asarray(areas, dtype=float)
 
 
-def _rim_vertices(triangles: Indices) -> Indices:
+def _rim_vertices(triangles: Integers) -> Integers:
     """Vertices of the longest border; shorter ones are holes and stay free."""
     edges = np.sort(triangle_edges(triangles), axis=1)
     count = int(triangles.max()) + 1
@@ -130,7 +127,7 @@ def _rim_vertices(triangles: Indices) -> Indices:
     return np.unique(border[loop[border[:, 0]] == longest])
 
 
-def _cotangent_laplacian(vertices: Floats, triangles: Indices) -> sparse.csr_array:
+def _cotangent_laplacian(vertices: Floats, triangles: Integers) -> sparse.csr_array:
     """Laplacian (V, V) with cotangent weights, kept positive so that no triangle of the map turns over."""
     count = len(vertices)
     total = sparse.csr_array((count, count))

@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import CORNERS, GAUSS_POINTS, jacobians, shape_functions, volumes
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -33,7 +31,7 @@ class MeshQuality:
     surface_distance_p95_mm: float
 
 
-def mesh_quality(mesh: BlockMesh, vertices: Floats, triangles: Indices, volume_mm3: float) -> MeshQuality:
+def mesh_quality(mesh: BlockMesh, vertices: Floats, triangles: Integers, volume_mm3: float) -> MeshQuality:
     """Judge a mesh against a mask's surface: vertices (V, 3) in mm, triangles (T, 3), and the mask's volume."""
     nodes = mesh.points[mesh.hexes()]
     distance = surface_distances(mesh, vertices, triangles)
@@ -58,7 +56,7 @@ def folded_corners(nodes: Floats) -> NDArray[np.bool_]:
     return np.asarray(scaled_jacobians(nodes, CORNERS) <= 0.0)
 
 
-def surface_distances(mesh: BlockMesh, vertices: Floats, triangles: Indices) -> Floats:
+def surface_distances(mesh: BlockMesh, vertices: Floats, triangles: Integers) -> Floats:
     """Distances in mm from each surface to the other, of points spread evenly over both, all in one array."""
     of_mesh = _sample_quads(mesh.points[np.concatenate([mesh.skin_quads(), mesh.back_quads()])])
     of_mask = vertices[triangles].mean(axis=1)

@@ -3,15 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.optimize import minimize
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.trilinear import CORNERS, jacobians, shape_gradients
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _VOLUME_WEIGHT = 0.3
 _POWER = 4
@@ -72,7 +69,7 @@ def relax(mesh: BlockMesh, cell: Floats, squares: SquaredTerms, iterations: int)
     return BlockMesh(mesh.n, result.x.reshape(-1, 3))
 
 
-def _scaled(points: Floats, hexes: Indices, cell: Floats) -> Floats:
+def _scaled(points: Floats, hexes: Integers, cell: Floats) -> Floats:
     """Jacobian matrices (E, Q, 3, 3) relative to the ideal element."""
     return jacobians(points[hexes], _NEAR_CORNERS) * (2.0 / cell)
 
@@ -95,7 +92,7 @@ def _distortion(matrix: Floats, epsilon: float) -> tuple[float, Floats]:
     return float((total**_POWER).mean()), outer[..., None, None] * by_matrix
 
 
-def _scatter(by_node: Floats, hexes: Indices, count: int) -> Floats:
+def _scatter(by_node: Floats, hexes: Integers, count: int) -> Floats:
     """Sum element contributions (E, 8, 3) to nodes (count, 3)."""
     index = hexes.ravel()
     flat = by_node.reshape(-1, 3)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mammoreg.geometry.frames import Points
+from mammoreg.arrays import Points
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 _NORMAL_WEIGHT_MM = 12.0
 _SMOOTHING_VOXELS = 0.9
@@ -61,8 +59,8 @@ class BreastSurface:
 
     vertices: Floats
     normals: Floats
-    triangles: Indices
-    skin_triangles: Indices
+    triangles: Integers
+    skin_triangles: Integers
     skin: OrientedCloud
     back: OrientedCloud
     volume_mm3: float
@@ -96,7 +94,7 @@ def breast_surface(mask: Volume, chest_wall_surface: Floats) -> BreastSurface:
     return BreastSurface(vertices, normals, triangles, skin_triangles, skin, back, inside)
 
 
-def triangulate(mask: Volume) -> tuple[Floats, Indices]:
+def triangulate(mask: Volume) -> tuple[Floats, Integers]:
     """Surface of a mask as vertices (V, 3) in mm and outward triangles (T, 3), sub-voxel by light smoothing."""
     if not np.any(mask.data):
         raise DataError("the breast mask is empty: check the segmentation's label picture")
@@ -110,7 +108,7 @@ def triangulate(mask: Volume) -> tuple[Floats, Indices]:
     return mask.to_world(vertices.astype(float) - 4.0), _largest_piece(triangles.astype(np.int64))
 
 
-def _vertex_normals(vertices: Floats, triangles: Indices) -> Floats:
+def _vertex_normals(vertices: Floats, triangles: Integers) -> Floats:
     corners = vertices[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     total = np.zeros_like(vertices)
@@ -141,7 +139,7 @@ def _relation_to_back(vertices: Floats, normals: Floats, back: OrientedCloud) ->
     return height, np.einsum("vc,vc->v", normals, plane)
 
 
-def _smooth_labels(label: NDArray[np.bool_], triangles: Indices, rounds: int = 6) -> NDArray[np.bool_]:
+def _smooth_labels(label: NDArray[np.bool_], triangles: Integers, rounds: int = 6) -> NDArray[np.bool_]:
     """Majority over neighbours, several times, so that the border between the labels has no teeth."""
     adjacency = vertex_adjacency(triangles, len(label))
     average = sparse.diags_array(1.0 / np.maximum(adjacency.sum(axis=1), 1.0)) @ adjacency
@@ -151,7 +149,7 @@ def _smooth_labels(label: NDArray[np.bool_], triangles: Indices, rounds: int = 6
     return np.asarray(value > 0.5)
 
 
-def vertex_adjacency(triangles: Indices, count: int) -> sparse.csr_array:
+def vertex_adjacency(triangles: Integers, count: int) -> sparse.csr_array:
     """Symmetric matrix (count, count) with 1 for each edge of the triangles (T, 3)."""
     first, second = triangle_edges(triangles).T
     half = sparse.coo_array((np.ones(len(first)), (first, second)), shape=(count, count)).tocsr()
@@ -160,12 +158,12 @@ def vertex_adjacency(triangles: Indices, count: int) -> sparse.csr_array:
     return both
 
 
-def triangle_edges(triangles: Indices) -> Indices:
+def triangle_edges(triangles: Integers) -> Integers:
     """Directed edges (3 T, 2) of triangles (T, 3)."""
     return np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
 
 
-def _largest_piece(triangles: Indices) -> Indices:
+def _largest_piece(triangles: Integers) -> Integers:
     """The triangles of the largest connected piece."""
     if not len(triangles):
         return triangles

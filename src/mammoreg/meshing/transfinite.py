@@ -1,9 +1,8 @@
 """Transfinite interpolation after Gordon and Hall (paper, section II-A)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mammoreg.arrays import Floats
 
 
 def fill_face(face: Floats) -> Floats:

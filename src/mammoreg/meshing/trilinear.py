@@ -1,9 +1,8 @@
 """The trilinear hexahedron: shape functions on [-1, 1]^3 in VTK node order."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mammoreg.arrays import Floats
 
 CORNERS: Floats = np.array(
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]], dtype=float

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 
 
 def breast_scale_mm(geometry: ViewGeometry) -> float:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mammoreg.arrays import Floats
 
 
 def sideways_drift_mm(

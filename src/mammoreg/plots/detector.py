@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Bools
 from mammoreg.localization.lesions import LesionArea
 from mammoreg.plots.style import add_corner_label, add_scale_bar, grey_window
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -27,7 +26,7 @@ class DetectorImage:
     """
 
     pixels: NDArray[Any]
-    breast: Mask
+    breast: Bools
     pixel_mm: float
     rows: int
     step: int = 1

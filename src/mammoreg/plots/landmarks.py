@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume
 from mammoreg.plots.detector import DetectorImage, draw_displacements, line_key, show_detector_image
 from mammoreg.plots.style import (
@@ -21,7 +21,6 @@ from mammoreg.plots.style import (
     to_png,
 )
 
-Points = NDArray[np.float64]
 _OUTLINE_COLOUR = "#d0d0d0"
 _AROUND_MM = 35.0
 

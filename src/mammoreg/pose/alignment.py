@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import Silhouette, detector_mm
 

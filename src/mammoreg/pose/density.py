@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.imaging.correlation import correlation
 from mammoreg.pose.silhouette import detector_mm
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.locate import interpolate
 from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import Alignment, align, measure

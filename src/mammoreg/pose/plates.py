@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from skimage.measure import marching_cubes
 
+from mammoreg.arrays import Points
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume, breast_to_plate
-from mammoreg.geometry.frames import Points
 
 SMOOTHING_VOXELS = 0.8
 FACING = 0.96  # cosine of the largest angle (16 degrees) between a plate's normal and a facet that lies on it

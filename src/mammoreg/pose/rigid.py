@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points, breast_to_plate
+from mammoreg.geometry.frames import breast_to_plate
 from mammoreg.pose.alignment import align
 from mammoreg.pose.outline import RadialOutline
 

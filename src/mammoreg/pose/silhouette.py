@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 
 MARGIN_DEG = 1.0  # rays stay this far from the chest-wall edge, along which a crossing is ill-conditioned
 

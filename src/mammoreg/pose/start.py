@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, breast_to_plate
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.estimate import Compressed

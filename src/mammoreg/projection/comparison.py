@@ -5,14 +5,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats32
 from mammoreg.imaging.correlation import correlation
-from mammoreg.projection.cone_beam import Image
 
 BREAST = 1
 
 
 def projection_correlation(
-    projection: Image,
+    projection: Floats32,
     silhouette: NDArray[np.bool_],
     mammogram: NDArray[Any],
     labels: NDArray[np.integer],
@@ -30,7 +30,7 @@ def projection_correlation(
     return correlation(projection, block_mean(np.asarray(mammogram, dtype=np.float32), step), silhouette & breast)
 
 
-def block_mean(image: Image, step: int) -> Image:
+def block_mean(image: Floats32, step: int) -> Floats32:
     """Means over blocks of `step` x `step` pixels; border blocks are filled up with the border's values."""
     rows, columns = (-(-size // step) * step for size in image.shape)
     padded = np.pad(image, ((0, rows - image.shape[0]), (0, columns - image.shape[1])), mode="edge")

@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats32
 from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.projection.regular import interpolate_axis
-
-Image = NDArray[np.float32]
 
 
 def detector_pixels(view: ViewGeometry, step: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -18,7 +17,7 @@ def detector_pixels(view: ViewGeometry, step: int) -> tuple[NDArray[np.float64],
     return np.asarray(rows, dtype=float), np.asarray(columns, dtype=float)
 
 
-def project_volume(volume: Volume, view: ViewGeometry, step: int = 4) -> Image:
+def project_volume(volume: Volume, view: ViewGeometry, step: int = 4) -> Floats32:
     """Line integrals through a volume along the beams, at every `step`-th pixel.
 
     With a point source every slice of constant height is magnified about the source's foot, so that the integral is a
@@ -33,7 +32,7 @@ def project_volume(volume: Volume, view: ViewGeometry, step: int = 4) -> Image:
         Image (ceil(rows / step), ceil(columns / step)), canonical; without unit for an attenuation in 1/mm.
     """
     along, forward = _detector_mm(view, step)
-    image: Image = np.zeros((len(along), len(forward)), dtype=np.float32)
+    image: Floats32 = np.zeros((len(along), len(forward)), dtype=np.float32)
     for zoomed in _zoomed_slices(volume, view, along, forward):
         image += zoomed
     return np.asarray(image * float(volume.spacing[2]) * _obliquity(along, forward, view), dtype=np.float32)
@@ -56,7 +55,7 @@ def _detector_mm(view: ViewGeometry, step: int) -> tuple[NDArray[np.float64], ND
 
 def _zoomed_slices(
     volume: Volume, view: ViewGeometry, along: NDArray[np.float64], forward: NDArray[np.float64]
-) -> Iterator[Image]:
+) -> Iterator[Floats32]:
     """Each slice of constant height as the detector sees it."""
     heights = volume.origin[2] + volume.spacing[2] * np.arange(volume.shape[2])
     for level, zoom in enumerate(view.magnification(heights)):

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.locate import Locator, interpolate
 from mammoreg.projection.regular import interpolate_axis
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats32, Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import AffineDeformation, MeshDeformation, MethodView
 from mammoreg.materials.attenuation import attenuation_map
-from mammoreg.projection.cone_beam import Image, project_shadow, project_volume
+from mammoreg.projection.cone_beam import project_shadow, project_volume
 from mammoreg.projection.deformed import MeshInverse, PlateGrid, grid_around, resample, undeformed_positions
 
 
@@ -77,7 +77,7 @@ def deform_breast(method: MethodView, nodes: Points, spacing_mm: float) -> Defor
 
 def project_breast(
     breast: DeformedBreast, tissue: ImagedTissue, method: MethodView, step: int
-) -> tuple[Image, NDArray[np.bool_]]:
+) -> tuple[Floats32, NDArray[np.bool_]]:
     """Projected attenuation and silhouette of a deformed breast, at the middles of blocks of `step` pixels."""
     image = project_volume(breast.carry(tissue.attenuation), method.geometry, step)
     return image, project_shadow(breast.carry(tissue.mask), method.geometry, step)

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.fem.parts.plane_ties import PlaneTies
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import Alignment, measure
 from mammoreg.pose.outline import RadialOutline

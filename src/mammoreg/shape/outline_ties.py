@@ -9,9 +9,9 @@ faces stay on the plates, the free edge keeps the bulge of an incompressible bod
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.fem.parts.plane_ties import PlaneTies
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import measure
 from mammoreg.pose.outline import RadialOutline

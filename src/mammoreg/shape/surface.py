@@ -3,17 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Integers, Points
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.meshing.skin import skin_facets
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.shape.estimate import ShapeEstimate, estimate_shape
 
-Nodes = NDArray[np.int64]
 TOUCHING_MM = 1.0  # a node nearer to a plate's flat face lies on it
 
 
@@ -45,7 +43,7 @@ class DrawnSurface:
         contact_drift_mm: largest motion along the compression of nodes that lay on the plates.
     """
 
-    nodes: Nodes
+    nodes: Integers
     closed: Closed
     estimate: ShapeEstimate | None = None
     contact_drift_mm: float = 0.0
@@ -96,14 +94,14 @@ def drawn_surface(
     return DrawnSurface(nodes, found.closed, found, drift)
 
 
-def _on_plates(nodes: Nodes, closing: Closing, closed: Closed) -> Nodes:
+def _on_plates(nodes: Integers, closing: Closing, closed: Closed) -> Integers:
     """Those of `nodes` (B,) that lie on the plates' flat faces."""
     flat = nodes if closing.edge is None else nodes[closed.deformed[nodes, 1] < closing.edge - closing.lip]
     height = closed.deformed[flat, 2] - closed.height_mm
     return np.asarray(flat[(height < TOUCHING_MM) | (height > closed.gap_mm - TOUCHING_MM)])
 
 
-def _drift(nodes: Nodes, before: Closed, after: Closed) -> float:
+def _drift(nodes: Integers, before: Closed, after: Closed) -> float:
     """Largest motion along the compression of nodes (B,) that lay on the plates, mm."""
     heights = [closed.deformed[nodes, 2] - closed.height_mm for closed in (before, after)]
     return float(np.abs(heights[1] - heights[0]).max(initial=0.0))

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from mammoreg.geometry.frames import Points
+from mammoreg.arrays import Points
 from mammoreg.meshing.skin import skin_facets
 
 _FACETS = 8

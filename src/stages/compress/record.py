@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.breast.compression import Compression
 from mammoreg.breast.mechanics import BreastMechanics
 from mammoreg.breast.placed import PlacedBreast, closing_plates, place_breast
@@ -15,7 +16,6 @@ from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.fem.plates.state import DampedState
 from mammoreg.fem.report import SolveReport
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from stages.deformed import FORCE_VALUES, MESH_VALUES, force_values, mesh_values
 from stages.engine.artefact import Array, Artefact, Fields, Value

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from mammoreg.geometry.frames import Points
+from mammoreg.arrays import Points
 from mammoreg.localization.lesions import LesionArea, MrLesion
 from mammoreg.metrics.distances import detector_distance_mm, distance_to_curve_mm
 from mammoreg.metrics.overlap import Overlap, overlap_of_areas, overlap_of_volumes

@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast, plate_to_breast
-from mammoreg.geometry.frames import Laterality, Points, plate_rotation
+from mammoreg.geometry.frames import Laterality, plate_rotation
 from mammoreg.meshing.block import BlockMesh
 from stages.compress.record import GLAND_SHARE, CompressRecord
 from stages.figures.case import PicturedCase

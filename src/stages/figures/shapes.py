@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, breast_to_plate, lps_to_breast
-from mammoreg.geometry.frames import Points
+from mammoreg.labels import Label
 from mammoreg.meshing.locate import Locator
 from mammoreg.plots.mesh3d import PlatesPicture, deformed_meshes
 from mammoreg.plots.outlines import ViewOutlines, outlines_before_and_after
@@ -15,8 +16,6 @@ from stages.figures.images import mammogram
 from stages.methods import MESH_METHODS
 from stages.pose.record import FINE_RAYS
 from stages.segment.record import SegmentRecord
-
-_GLAND = 2
 
 
 def outlines(case: PicturedCase) -> Png | None:
@@ -61,7 +60,7 @@ def tissues(case: PicturedCase) -> Png | None:
     if segment is None:
         return None
     breast, labels = segment.breast_mask_lps, segment.labels_lps
-    gland = labels.with_data((labels.data == _GLAND) & (breast.data != 0))
+    gland = labels.with_data((labels.data == Label.GLAND) & (breast.data != 0))
     nipple = segment.nipple_lps
     return segmentation(segment.mr_lps, breast, gland, _mesh_mask(case, segment, nipple), nipple, case.laterality)
 

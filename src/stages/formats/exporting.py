@@ -15,8 +15,6 @@ from mammoreg.meshing.block import BlockMesh
 from stages.engine.artefact import Artefact
 from stages.engine.writing import write_bytes
 
-HEX_NODES = 8
-
 
 def export_artefact(artefact: Artefact, folder: Path) -> list[Path]:
     """Write what an artefact holds as files named after its contents.

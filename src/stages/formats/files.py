@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
 from stages.cohort.readers.mr_header import read_mr_grid
 
 _LPS_TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.lesions import LesionArea
 from stages.engine.artefact import Array, Artefact, Fields, VolumeField
 

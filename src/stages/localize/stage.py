@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import chain
 
+from mammoreg.arrays import Points
 from mammoreg.errors import DataError
 from mammoreg.geometry import lps_to_breast
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 from mammoreg.meshing.block import BlockMesh
 from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_lesion_names
 from stages.engine.artefact import Artefact, Fields, first_failure

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import breast_to_lps
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.to_compressed import SecondVolume
 from stages.engine.artefact import Fields
 from stages.localize.record import CompressedRow, compressed_fields

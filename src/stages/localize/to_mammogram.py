@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.geometry.frames import Points
+from mammoreg.arrays import Points
 from mammoreg.localization.deformation import MethodView
 from mammoreg.localization.lesions import LesionBody
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion

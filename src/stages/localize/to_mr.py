@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, breast_to_lps
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.anatomy import clock_position, distance_to
 from mammoreg.localization.grid import BreastGrid, BreastInView
 from mammoreg.localization.lesions import LesionArea

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points, plate_rotation
+from mammoreg.geometry.frames import plate_rotation
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.outlined import OutlinedView

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.localization.deformation import AffineDeformation
 from mammoreg.pose.outline import RadialOutline, radial_outline
 from mammoreg.pose.outlined import OUTLINE_RAYS

@@ -3,9 +3,9 @@
 import numpy as np
 from pydantic import Field
 
+from mammoreg.arrays import Points
 from mammoreg.errors import NotConvergedError
 from mammoreg.geometry import ViewGeometry
-from mammoreg.geometry.frames import Points
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.dense_tissue import dense_tissue
 from mammoreg.pose.estimate import PoseEstimate

@@ -5,8 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Array, Fields, Value, VolumeField
 from stages.engine.record import Record
 

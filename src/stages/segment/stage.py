@@ -7,6 +7,7 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
+from mammoreg.labels import Label
 from stages.bias import n4_field
 from stages.cohort.readers.mr import read_mr, read_nifti
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
@@ -78,7 +79,7 @@ def _values(found: Segmentation) -> dict[str, Value]:
     return {
         "fat_suppressed": found.fat_suppressed,
         "breast_volume_ml": round(float(found.breast.sum()) * found.mr.voxel_mm3 / 1000.0, 3),
-        "gland_share": round(float((found.labels[found.breast] == 2).mean()), 4),
+        "gland_share": round(float((found.labels[found.breast] == Label.GLAND).mean()), 4),
     }
 
 

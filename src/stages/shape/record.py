@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Points
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.fem.plates.state import DampedState
-from mammoreg.geometry.frames import Points
 from stages.compress.record import kept_memory, memory_arrays
 from stages.engine.artefact import Array, Fields, Value
 from stages.engine.record import Record

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mammoreg.fem.elements.hexahedra import Array, Integers
+from mammoreg.arrays import Floats, Integers
 from mammoreg.materials.elastic import ElasticMaterial
 
 RUN = 64
@@ -25,11 +25,11 @@ class ElementRun:
 
     elements: slice
     hexes: Integers
-    gradients: Array
-    weights: Array
+    gradients: Floats
+    weights: Floats
     material: ElasticMaterial
 
-    def deformation_gradients(self, positions: Array) -> Array:
+    def deformation_gradients(self, positions: Floats) -> Floats:
         """F by component (3 spatial, 3 material, C, Q) at nodes (N, 3) in mm."""
         count, corners, quadrature = self.gradients.shape[:3]
         flat = self.gradients.reshape(count, corners, 3 * quadrature)
@@ -39,14 +39,16 @@ class ElementRun:
         return np.ascontiguousarray(components)
 
 
-def element_runs(hexes: Integers, gradients: Array, weights: Array, material: ElasticMaterial) -> Iterator[ElementRun]:
+def element_runs(
+    hexes: Integers, gradients: Floats, weights: Floats, material: ElasticMaterial
+) -> Iterator[ElementRun]:
     """All elements in runs; gradients (E, 8, Q, 3), material with one value per element."""
     for start in range(0, len(hexes), RUN):
         part = slice(start, min(start + RUN, len(hexes)))
         yield ElementRun(part, hexes[part], gradients[part], weights[part], material.part(part))
 
 
-def cofactors(gradient: Array) -> tuple[Array, Array]:
+def cofactors(gradient: Floats) -> tuple[Floats, Floats]:
     """Cofactors (3, 3, ...) and determinants (...) of matrices by component (3, 3, ...)."""
     found = np.empty_like(gradient)
     for row in range(3):
@@ -54,12 +56,12 @@ def cofactors(gradient: Array) -> tuple[Array, Array]:
     return found, _along_first_row(gradient, found[0])
 
 
-def determinants(gradient: Array) -> Array:
+def determinants(gradient: Floats) -> Floats:
     """Determinants (...) of matrices by component (3, 3, ...)."""
     return _along_first_row(gradient, _cofactor_row(gradient, 0, np.empty_like(gradient[0])))
 
 
-def _cofactor_row(gradient: Array, row: int, found: Array) -> Array:
+def _cofactor_row(gradient: Floats, row: int, found: Floats) -> Floats:
     above, below = gradient[(row + 1) % 3], gradient[(row + 2) % 3]
     for j in range(3):
         k, m = (j + 1) % 3, (j + 2) % 3
@@ -68,10 +70,10 @@ def _cofactor_row(gradient: Array, row: int, found: Array) -> Array:
     return found
 
 
-def _along_first_row(gradient: Array, first: Array) -> Array:
+def _along_first_row(gradient: Floats, first: Floats) -> Floats:
     return np.asarray(gradient[0, 0] * first[0] + gradient[0, 1] * first[1] + gradient[0, 2] * first[2])
 
 
-def by_point(components: Array) -> Array:
+def by_point(components: Floats) -> Floats:
     """From (3, 3, C, Q) to contiguous (C, Q, 3, 3)."""
     return np.ascontiguousarray(components.transpose(2, 3, 0, 1))

@@ -4,10 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import skfem
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from mammoreg.arrays import Floats, Integers
 
 VTK_IN_SKFEM = [0, 4, 3, 1, 7, 5, 2, 6]
 """scikit-fem's corner c is corner VTK_IN_SKFEM[c] of the VTK order."""
@@ -23,18 +21,18 @@ class Hexahedra:
         volume: undeformed volume of each element, (E,), mm3.
     """
 
-    gradients: Array
-    weights: Array
-    volume: Array
+    gradients: Floats
+    weights: Floats
+    volume: Floats
 
 
-def skfem_basis(points: Array, hexes: Integers) -> skfem.Basis:
+def skfem_basis(points: Floats, hexes: Integers) -> skfem.Basis:
     """scikit-fem's basis of trilinear hexahedra (corners in VTK order) with 2 x 2 x 2 Gauss points."""
     mesh = skfem.MeshHex(np.ascontiguousarray(points.T), np.ascontiguousarray(hexes[:, VTK_IN_SKFEM].T))
     return skfem.Basis(mesh, skfem.ElementHex1(), intorder=3)
 
 
-def hexahedra(points: Array, hexes: Integers) -> Hexahedra:
+def hexahedra(points: Floats, hexes: Integers) -> Hexahedra:
     """Gradients and weights of hexahedra (E, 8) in VTK order over points (N, 3) in mm.
 
     Raises:
@@ -51,12 +49,12 @@ def hexahedra(points: Array, hexes: Integers) -> Hexahedra:
     return Hexahedra(gradients, weights, weights.sum(axis=1))
 
 
-def jacobians(points: Array, hexes: Integers) -> Array:
+def jacobians(points: Floats, hexes: Integers) -> Floats:
     """Signed Jacobian determinants (E, 8) at the Gauss points, mm3 per unit of the reference cube [0, 1]^3."""
     return np.asarray(np.linalg.det(np.einsum("qac,eai->eqci", reference_gradients(), points[hexes])))
 
 
-def reference_gradients() -> Array:
+def reference_gradients() -> Floats:
     """Gradients (8 Gauss points, 8 corners in VTK order, 3) of the shape functions on the cube [0, 1]^3."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], float)
     gauss = 0.5 + 0.5 / np.sqrt(3.0) * (2.0 * corners - 1.0)

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.elements.batches import ElementRun, determinants, element_runs
-from mammoreg.fem.elements.hexahedra import Array, Integers, hexahedra
+from mammoreg.fem.elements.hexahedra import hexahedra
 from mammoreg.fem.elements.state import RunState, run_energy, run_forces, run_state
 from mammoreg.fem.elements.tangent import TangentWork, run_tangent
 from mammoreg.materials.elastic import ElasticMaterial
@@ -33,18 +34,18 @@ class ElementState:
     elements: tuple[ElementRun, ...]
 
     @property
-    def det(self) -> Array:
+    def det(self) -> Floats:
         """Determinants of F (E, Q)."""
         return np.concatenate([run.det for run in self.runs])
 
     @property
-    def gradients(self) -> Array:
+    def gradients(self) -> Floats:
         """Spatial gradients of the shape functions (E, Q, 8, 3), 1/mm."""
         pairs = zip(self.elements, self.runs, strict=True)
         return np.concatenate([run.gradients.transpose(0, 2, 1, 3) @ state.inverse for run, state in pairs])
 
     @property
-    def deviator(self) -> Array:
+    def deviator(self) -> Floats:
         """Deviatoric Kirchhoff stress (E, Q, 6), kPa: 11, 22, 33, 12, 23, 31."""
         stress = np.concatenate([np.linalg.inv(run.inverse) @ run.stress for run in self.runs])
         stress -= np.trace(stress, axis1=-2, axis2=-1)[..., None, None] / 3.0 * np.eye(3)
@@ -61,9 +62,9 @@ class Residual:
         coupling: derivative of the volumes (E, 24), mm2.
     """
 
-    force: Array
-    volume: Array
-    coupling: Array
+    force: Floats
+    volume: Floats
+    coupling: Floats
 
 
 class HyperelasticModel:
@@ -77,7 +78,7 @@ class HyperelasticModel:
     Forces inside the package are kPa mm2 = mN.
     """
 
-    def __init__(self, points: Array, hexes: NDArray[np.integer], material: ElasticMaterial) -> None:
+    def __init__(self, points: Floats, hexes: NDArray[np.integer], material: ElasticMaterial) -> None:
         self.points = np.array(points, dtype=float)
         self.hexes: Integers = np.array(hexes, dtype=np.int64)
         self.material = material.of_elements(len(self.hexes))
@@ -88,7 +89,7 @@ class HyperelasticModel:
         self.dofs = (3 * self.hexes[:, :, None] + np.arange(3)).reshape(len(self.hexes), 24)
 
     @property
-    def bulk_per_volume(self) -> Array:
+    def bulk_per_volume(self) -> Floats:
         """K / V (E,), the stiffness of each element's pressure equation."""
         return np.asarray(self.material.bulk_kpa / self.volume)
 
@@ -97,15 +98,15 @@ class HyperelasticModel:
         """Initial shear modulus, the mean over the volume."""
         return float(np.average(self.material.mu_kpa, weights=self.volume))
 
-    def determinants(self, positions: Array) -> Array:
+    def determinants(self, positions: Floats) -> Floats:
         """Determinants of F (E, Q) at deformed nodes (N, 3) in mm."""
         return np.concatenate([determinants(run.deformation_gradients(positions)) for run in self._runs])
 
-    def state(self, positions: Array) -> ElementState:
+    def state(self, positions: Floats) -> ElementState:
         """Kinematics and deviatoric stress at deformed nodes (N, 3) in mm; needs det F > 0."""
         return ElementState(tuple(run_state(run, positions) for run in self._runs), self._runs)
 
-    def residual(self, state: ElementState, pressure: Array) -> Residual:
+    def residual(self, state: ElementState, pressure: Floats) -> Residual:
         """Internal forces at element pressures (E,) in kPa (positive in tension)."""
         force, coupling = np.empty((len(self.hexes), 24)), np.empty((len(self.hexes), 24))
         volume = -pressure / self.bulk_per_volume
@@ -114,7 +115,7 @@ class HyperelasticModel:
             volume[run.elements] += (run.weights * (part.det - 1.0)).sum(axis=1)
         return Residual(force, volume, coupling)
 
-    def stiffness(self, state: ElementState, pressure: Array, coupling: Array) -> Array:
+    def stiffness(self, state: ElementState, pressure: Floats, coupling: Floats) -> Floats:
         """Tangent (E, 24, 24) in mN/mm with the pressures eliminated element by element."""
         tangent = np.empty((len(self.hexes), 24, 24))
         work = TangentWork(self.weights.shape[1], len(state.runs[0].bends))
@@ -124,14 +125,14 @@ class HyperelasticModel:
             run_tangent(run, part, pressure[at], rate[at], coupling[at], work, tangent[at])
         return tangent
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Isochoric strain energy in mJ (N mm)."""
         return sum(run_energy(run, positions) for run in self._runs) * 1e-3
 
-    def volumetric_energy_mj(self, pressure: Array) -> float:
+    def volumetric_energy_mj(self, pressure: Floats) -> float:
         """Energy in mJ that element pressures (E,) in kPa store in the change of volume: V p^2 / (2 K)."""
         return float((pressure**2 / (2.0 * self.bulk_per_volume)).sum()) * 1e-3
 
-    def volume_change(self, positions: Array) -> float:
+    def volume_change(self, positions: Floats) -> float:
         """Relative change of the body's volume at deformed nodes (N, 3)."""
         return float((self.weights * self.determinants(positions)).sum() / self.weights.sum() - 1.0)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mammoreg.arrays import Floats
 from mammoreg.fem.elements.batches import ElementRun, by_point, cofactors, determinants
-from mammoreg.fem.elements.hexahedra import Array
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,8 @@ class Bend:
         tensor: F^-1 d (C, Q, 3, 3), d = dev(bbar) or dev(abar x abar).
     """
 
-    stiffness: Array
-    tensor: Array
+    stiffness: Floats
+    tensor: Floats
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,16 @@ class RunState:
         bends: of laws with curvature and of fibres.
     """
 
-    det: Array
-    inverse: Array
-    stress: Array
-    trace: Array
-    shear: Array
-    fibre: Array | None
+    det: Floats
+    inverse: Floats
+    stress: Floats
+    trace: Floats
+    shear: Floats
+    fibre: Floats | None
     bends: tuple[Bend, ...]
 
 
-def run_state(run: ElementRun, positions: Array) -> RunState:
+def run_state(run: ElementRun, positions: Floats) -> RunState:
     """State of a run at deformed nodes (N, 3) in mm; needs det F > 0."""
     gradient = run.deformation_gradients(positions)
     cofactor, det = cofactors(gradient)
@@ -75,8 +75,8 @@ def run_state(run: ElementRun, positions: Array) -> RunState:
 
 
 def _law(
-    run: ElementRun, scale: Array, size: Array, transposed: Array, inverse: Array
-) -> tuple[Array, tuple[Bend, ...]]:
+    run: ElementRun, scale: Floats, size: Floats, transposed: Floats, inverse: Floats
+) -> tuple[Floats, tuple[Bend, ...]]:
     """2 W1' s (C, Q), and the law's term of the tangent if it has a curvature."""
     law = run.material.law
     if law is None:
@@ -86,7 +86,7 @@ def _law(
     return 2.0 * law.slope_kpa(i1) * scale, (Bend(4.0 * law.curvature_kpa(i1), tensor),)
 
 
-def run_forces(run: ElementRun, state: RunState, pressure: Array) -> tuple[Array, Array]:
+def run_forces(run: ElementRun, state: RunState, pressure: Floats) -> tuple[Floats, Floats]:
     """Internal forces (C, 24) in mN at pressures (C,) in kPa, and the derivative (C, 24) of the volumes in mm2."""
     count, corners, quadrature = run.gradients.shape[:3]
     flat = run.gradients.reshape(count, corners, 3 * quadrature)
@@ -98,7 +98,7 @@ def run_forces(run: ElementRun, state: RunState, pressure: Array) -> tuple[Array
     return both[..., :3].reshape(count, 24), both[..., 3:].reshape(count, 24)
 
 
-def run_energy(run: ElementRun, positions: Array) -> float:
+def run_energy(run: ElementRun, positions: Floats) -> float:
     """Isochoric energy in uJ (mN mm) of a run at deformed nodes (N, 3) in mm."""
     gradient = run.deformation_gradients(positions)
     scale = determinants(gradient) ** (-2.0 / 3.0)

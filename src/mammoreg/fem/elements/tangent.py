@@ -14,8 +14,8 @@ matrices over all quadrature points and its transpose; g_aj g_bi is another one,
 
 import numpy as np
 
+from mammoreg.arrays import Floats
 from mammoreg.fem.elements.batches import RUN, ElementRun
-from mammoreg.fem.elements.hexahedra import Array
 from mammoreg.fem.elements.state import RunState
 
 
@@ -30,7 +30,13 @@ class TangentWork:
 
 
 def run_tangent(
-    run: ElementRun, state: RunState, pressure: Array, rate: Array, coupling: Array, work: TangentWork, tangent: Array
+    run: ElementRun,
+    state: RunState,
+    pressure: Floats,
+    rate: Floats,
+    coupling: Floats,
+    work: TangentWork,
+    tangent: Floats,
 ) -> None:
     """Write the tangents (C, 24, 24) in mN/mm.
 
@@ -67,7 +73,7 @@ def run_tangent(
         blocks[:, :, axis, :, axis] += geometric
 
 
-def _bends(run: ElementRun, state: RunState, by_point: Array, left: Array, right: Array) -> None:
+def _bends(run: ElementRun, state: RunState, by_point: Floats, left: Floats, right: Floats) -> None:
     """Rows of the curvatures, half their stiffness at the left."""
     quadrature = run.weights.shape[1]
     for number, bend in enumerate(state.bends):
@@ -76,7 +82,7 @@ def _bends(run: ElementRun, state: RunState, by_point: Array, left: Array, right
         np.multiply(right[:, rows], (0.5 * run.weights * bend.stiffness)[..., None], out=left[:, rows])
 
 
-def _geometric(run: ElementRun, state: RunState) -> Array:
+def _geometric(run: ElementRun, state: RunState) -> Floats:
     """Sum of w g_a.(tau g_b) (C, 8, 8), by the undeformed gradients."""
     count, corners, quadrature = run.gradients.shape[:3]
     loaded = run.gradients * (run.weights * state.shear)[:, None, :, None]
@@ -88,6 +94,6 @@ def _geometric(run: ElementRun, state: RunState) -> Array:
     return np.asarray(loaded.reshape(flat.shape) @ flat.transpose(0, 2, 1))
 
 
-def _vectors(rows: Array) -> Array:
+def _vectors(rows: Floats) -> Floats:
     """Rows (C, Q, 24) as vectors of nodes (C, Q, 8, 3)."""
     return rows.reshape(*rows.shape[:2], 8, 3)

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 
 try:
@@ -16,7 +17,6 @@ try:
 except ImportError:  # the wrapper, or the MKL library that it looks for, is not installed
     pypardiso = None
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 _UNSYMMETRIC, _SYMMETRIC_INDEFINITE = 11, -2
@@ -46,13 +46,13 @@ class PardisoSolver:
         self._analysed, self.factorisations = False, 0
         weakref.finalize(self, _release, self._handle, self._type, self._size, self._iparm.copy())
 
-    def solve(self, values: Array, rhs: Array) -> Array:
+    def solve(self, values: Floats, rhs: Floats) -> Floats:
         """Factorise the matrix with these entries and solve for one right-hand side."""
         _refuse_infinite(values, rhs)
         self.factorise(values)
         return self._call(_SOLVE, self._values, rhs)
 
-    def factorise(self, values: Array) -> None:
+    def factorise(self, values: Floats) -> None:
         """Factorise the matrix with these entries; the first time the pattern is analysed too."""
         _refuse_infinite(values)
         self._values, nothing = values, np.zeros(self._size)
@@ -62,12 +62,12 @@ class PardisoSolver:
         self._call(_FACTORISE, values, nothing)
         self.factorisations += 1
 
-    def back_substitute(self, rhs: Array) -> Array:
+    def back_substitute(self, rhs: Floats) -> Floats:
         """Solve for one more right-hand side with the factors at hand."""
         _refuse_infinite(rhs)
         return self._call(_SOLVE, self._values, rhs)
 
-    def _call(self, phase: int, values: Array, rhs: Array) -> Array:
+    def _call(self, phase: int, values: Floats, rhs: Floats) -> Floats:
         # MKL gets bare addresses: a strided view would be read as if it were not one.
         values, rhs = (np.ascontiguousarray(array, dtype=float) for array in (values, rhs))
         solution = np.zeros(self._size)
@@ -84,12 +84,12 @@ def _pardiso(
     kind: int,
     phase: int,
     size: int,
-    values: Array,
+    values: Floats,
     indptr: Indices,
     indices: Indices,
     iparm: Indices,
-    rhs: Array,
-    solution: Array,
+    rhs: Floats,
+    solution: Floats,
 ) -> int:
     """One call of MKL's pardiso; its error code."""
     error, unused = ctypes.c_int32(0), np.zeros(1, dtype=np.int32)
@@ -115,12 +115,12 @@ class SuperLuSolver:
         self._indptr, self._indices, self._symmetric = indptr, indices, symmetric
         self.factorisations = 0
 
-    def solve(self, values: Array, rhs: Array) -> Array:
+    def solve(self, values: Floats, rhs: Floats) -> Floats:
         """Factorise the matrix with these entries and solve for one right-hand side."""
         self.factorise(values)
         return self.back_substitute(rhs)
 
-    def factorise(self, values: Array) -> None:
+    def factorise(self, values: Floats) -> None:
         """Factorise the matrix with these entries."""
         size = len(self._indptr) - 1
         matrix = sp.csr_array((values, self._indices, self._indptr), shape=(size, size))
@@ -132,12 +132,12 @@ class SuperLuSolver:
             raise NotConvergedError(f"the linear solver failed ({error})") from error
         self.factorisations += 1
 
-    def back_substitute(self, rhs: Array) -> Array:
+    def back_substitute(self, rhs: Floats) -> Floats:
         """Solve for one more right-hand side with the factors at hand."""
         return np.asarray(self._factors.solve(rhs))
 
 
-def _refuse_infinite(*arrays: Array) -> None:
+def _refuse_infinite(*arrays: Floats) -> None:
     if not all(np.isfinite(array).all() for array in arrays):
         raise NotConvergedError("the linear system holds values that are not finite")
 

@@ -12,10 +12,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.block import BlockMesh
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Number = TypeVar("Number", bound=np.generic)
 
 CORNERS = ((0, 0, 0), (0, 0, 1), (0, 1, 1), (0, 1, 0), (1, 0, 0), (1, 0, 1), (1, 1, 1), (1, 1, 0))
@@ -68,7 +67,7 @@ class Hierarchy:
             found[..., number][here] = grid[there]
         return found.ravel()
 
-    def stencil_values(self, blocks: Array, left: Array, right: Array) -> Array:
+    def stencil_values(self, blocks: Floats, left: Floats, right: Floats) -> Floats:
         """Element matrices less dyads, B - l r^T, summed as 3 x 3 blocks (27 nodes, 3, 3) of the stencil.
 
         Args:

@@ -3,19 +3,18 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 
-Array = NDArray[np.float64]
-Operator = Callable[[Array], Array]
+Operator = Callable[[Floats], Floats]
 
 RESTART = 80
 
 
 def fgmres(
-    operator: Operator, preconditioner: Operator, rhs: Array, tolerance: float, most: int, restart: int = RESTART
-) -> tuple[Array, int]:
+    operator: Operator, preconditioner: Operator, rhs: Floats, tolerance: float, most: int, restart: int = RESTART
+) -> tuple[Floats, int]:
     """Solve a linear system; preconditioned from the right, so that the residual is the true one.
 
     Args:
@@ -47,8 +46,8 @@ def fgmres(
 
 
 def _cycle(
-    operator: Operator, preconditioner: Operator, residual: Array, goal: float, most: int
-) -> tuple[Array, int, float]:
+    operator: Operator, preconditioner: Operator, residual: Floats, goal: float, most: int
+) -> tuple[Floats, int, float]:
     """Iterations until a restart: change of the solution, their number and the residual's norm."""
     first = float(np.linalg.norm(residual))
     basis, corrections = [residual / first], []
@@ -84,7 +83,7 @@ def _cycle(
     return change, count, abs(float(turned[count]))
 
 
-def _orthogonalised(product: Array, basis: list[Array]) -> Array:
+def _orthogonalised(product: Floats, basis: list[Floats]) -> Floats:
     """Make a vector orthogonal to a basis, in place; its components, and room for one more."""
     column = np.zeros(len(basis) + 1)
     for row, direction in enumerate(basis):

@@ -8,11 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.linear.direct import PardisoSolver, SuperLuSolver, linear_solver
 from mammoreg.fem.linear.hierarchy import Hierarchy
-
-Array = NDArray[np.float64]
 
 DEGREE = 3
 SMOOTHED_SHARE = 1.0 / 8.0  # of the spectrum, from its upper end, that the smoother acts on
@@ -50,7 +49,7 @@ class TwoGrid:
         down.eliminate_zeros()
         return sp.csr_array(down)
 
-    def renew(self, values: Array, rest: sp.csr_array) -> None:
+    def renew(self, values: Floats, rest: sp.csr_array) -> None:
         """Take new stencil values (27 nodes, 3, 3) and a new remainder (total, total).
 
         Raises:
@@ -69,29 +68,29 @@ class TwoGrid:
         self._largest = self._largest_eigenvalue()
         self._coarse = self._factor()
 
-    def product(self, vector: Array) -> Array:
+    def product(self, vector: Floats) -> Floats:
         """The matrix times a vector (total,)."""
         product = self._rest @ vector
         product[: 3 * self.nodes] += self._stencil @ vector[: 3 * self.nodes]
         return np.asarray(product)
 
-    def apply(self, vector: Array) -> Array:
+    def apply(self, vector: Floats) -> Floats:
         """The matrix of the unknowns times a vector (total,) that is zero at held components."""
         return np.where(self.free, self.product(vector), 0.0)
 
-    def scale(self) -> Array:
+    def scale(self) -> Floats:
         """Inverse square root of the diagonal (total,), one number a node; 1 at held components."""
         nodal = np.einsum("nii->n", self.diagonal) / 3.0
         return np.asarray(1.0 / np.sqrt(np.abs(np.append(np.repeat(nodal, 3), self.tail))))
 
-    def solve(self, residual: Array) -> Array:
+    def solve(self, residual: Floats) -> Floats:
         """One symmetric cycle: smooth, correct on the coarse grid, smooth."""
         change = self._smooth(residual)
         remaining = residual - self.apply(change)
         correction = self._down @ self._coarse.back_substitute(self._up @ remaining)
         return np.asarray(change + correction + self._smooth(remaining - self.apply(correction)))
 
-    def _diagonal_blocks(self, values: Array) -> Array:
+    def _diagonal_blocks(self, values: Floats) -> Floats:
         """3 x 3 blocks (nodes, 3, 3) of the whole matrix; identity at held components."""
         blocks = values.reshape(self.nodes, 27, 3, 3)[:, 13].copy()
         rest = sp.coo_array(self._rest)
@@ -102,7 +101,7 @@ class TwoGrid:
         blocks[:, range(3), range(3)] += ~self._own
         return np.asarray(blocks)
 
-    def _jacobi(self, vector: Array) -> Array:
+    def _jacobi(self, vector: Floats) -> Floats:
         scaled = np.empty(self.total)
         nodal = vector[: 3 * self.nodes].reshape(-1, 3, 1)
         scaled[: 3 * self.nodes] = np.matmul(self._inverse, nodal).ravel()
@@ -121,7 +120,7 @@ class TwoGrid:
         self._vector, self._power_steps = vector, POWER_STEPS
         return SAFETY * largest
 
-    def _smooth(self, residual: Array) -> Array:
+    def _smooth(self, residual: Floats) -> Floats:
         """Chebyshev iteration from zero."""
         high, low = self._largest, SMOOTHED_SHARE * self._largest
         middle, half = 0.5 * (high + low), 0.5 * (high - low)

@@ -14,15 +14,12 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.elements.model import HyperelasticModel, Residual
 from mammoreg.fem.linear.hierarchy import Hierarchy
 from mammoreg.fem.linear.krylov import fgmres
 from mammoreg.fem.linear.multigrid import TwoGrid
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 RESIDUAL = 3e-3
 ITERATIONS = 200
@@ -56,8 +53,8 @@ class SaddleSystem:
         self.iterations: list[int] = []
 
     def increment(
-        self, internal: Residual, residual: Array, blocks: Sequence[Array], imposed: Array | None = None
-    ) -> tuple[Array, Array]:
+        self, internal: Residual, residual: Floats, blocks: Sequence[Floats], imposed: Floats | None = None
+    ) -> tuple[Floats, Floats]:
         """Update (total,) of the degrees of freedom and (E,) of the pressures.
 
         Args:
@@ -79,7 +76,7 @@ class SaddleSystem:
         update, pressure = start + solution[: self._total], solution[self._total :]
         return update, self._augmented * (internal.volume + self._coupling @ update) + pressure
 
-    def _renew(self, internal: Residual, blocks: Sequence[Array]) -> None:
+    def _renew(self, internal: Residual, blocks: Sequence[Floats]) -> None:
         """Take the matrices of a new Newton iteration."""
         coupling, rate, volume = internal.coupling, self._model.bulk_per_volume, self._model.volume
         size = (coupling**2).sum(axis=1)
@@ -94,7 +91,7 @@ class SaddleSystem:
         values = self._hierarchy.stencil_values(blocks[0], less, coupling)
         self._grids.renew(values, remainder(self._groups, blocks[1:], self._total))
 
-    def _couplings(self, coupling: Array) -> tuple[sp.csr_array, sp.csr_array]:
+    def _couplings(self, coupling: Floats) -> tuple[sp.csr_array, sp.csr_array]:
         """The coupling as a matrix (E, total) and its transpose over the unknowns (total, E)."""
         elements = len(coupling)
         start = np.arange(elements + 1, dtype=np.int32) * 24
@@ -102,7 +99,7 @@ class SaddleSystem:
         matrix = sp.csr_array((coupling.ravel(), columns, start), shape=(elements, self._total))
         return matrix, sp.csr_array(matrix.T)
 
-    def _solve(self, rhs: Array) -> Array:
+    def _solve(self, rhs: Floats) -> Floats:
         """GMRES in units that make both kinds of unknowns alike."""
         scale = np.concatenate([self._grids.scale(), 1.0 / np.sqrt(self._schur)])
         solution, count = fgmres(
@@ -115,19 +112,19 @@ class SaddleSystem:
         self.iterations.append(count)
         return solution
 
-    def _apply(self, vector: Array) -> Array:
+    def _apply(self, vector: Floats) -> Floats:
         update, pressure = vector[: self._total], vector[self._total :]
         force = self._grids.apply(update) + np.where(self._free, self._transposed @ pressure, 0.0)
         return np.concatenate([force, self._coupling @ update - self._flexibility * pressure])
 
-    def _precondition(self, vector: Array) -> Array:
+    def _precondition(self, vector: Floats) -> Floats:
         """Block triangular: the pressures by their Schur complement, then the displacements by a cycle."""
         pressure = -vector[self._total :] / self._schur
         force = vector[: self._total] - np.where(self._free, self._transposed @ pressure, 0.0)
         return np.concatenate([self._grids.solve(force), pressure])
 
 
-def remainder(groups: Sequence[Integers], blocks: Sequence[Array], total: int) -> sp.csr_array:
+def remainder(groups: Sequence[Integers], blocks: Sequence[Floats], total: int) -> sp.csr_array:
     """Sum of blocks (blocks, size, size) as one sparse matrix (total, total); blocks of zeros cost nothing."""
     rows, columns, entries = [], [], []
     for group, block in zip(groups, blocks, strict=True):

@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from mammoreg.arrays import Floats, Integers
 
 
 class Assembler:
@@ -42,7 +40,7 @@ class Assembler:
         counts = np.bincount(unique // self.size, minlength=self.size)
         self.indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
 
-    def values(self, blocks: Sequence[Array]) -> Array:
+    def values(self, blocks: Sequence[Floats]) -> Floats:
         """Entries of the matrix from the blocks (blocks, size, size) of each group."""
         flat = np.concatenate([block.ravel() for block in blocks])
         sums = np.bincount(self._slot, weights=flat, minlength=len(self.indices) + 1)

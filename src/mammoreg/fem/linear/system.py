@@ -5,12 +5,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel, Residual
 from mammoreg.fem.linear.direct import PardisoSolver, SuperLuSolver, linear_solver
 from mammoreg.fem.linear.hierarchy import Hierarchy
 from mammoreg.fem.linear.saddle import SaddleSystem
-from mammoreg.fem.linear.sparse import Array, Assembler, Integers
+from mammoreg.fem.linear.sparse import Assembler
 
 _log = logging.getLogger(__name__)
 
@@ -57,19 +58,19 @@ class NewtonSystem:
         """Iterations of each iterative solve so far."""
         return [] if self._iterative is None else self._iterative.iterations
 
-    def sum(self, vectors: Sequence[Array]) -> Array:
+    def sum(self, vectors: Sequence[Floats]) -> Floats:
         """Assemble block vectors, one array per group, over all degrees of freedom (total,)."""
         flat = np.concatenate([vector.ravel() for vector in vectors])
         return np.asarray(np.bincount(self._index, weights=flat, minlength=self.total), dtype=float)
 
-    def unbalance(self, vectors: Sequence[Array]) -> float:
+    def unbalance(self, vectors: Sequence[Floats]) -> float:
         """Ratio of unbalanced to internal forces."""
         scale = float(np.linalg.norm(self.sum([np.abs(vector) for vector in vectors])))
         return float(np.linalg.norm(self.sum(vectors)[self.free])) / max(scale, 1e-12)
 
     def increment(
-        self, internal: Residual, vectors: Sequence[Array], blocks: Sequence[Array], imposed: Array | None = None
-    ) -> tuple[Array, Array]:
+        self, internal: Residual, vectors: Sequence[Floats], blocks: Sequence[Floats], imposed: Floats | None = None
+    ) -> tuple[Floats, Floats]:
         """Newton update (total,) of the degrees of freedom and (E,) of the pressures.
 
         Args:
@@ -88,8 +89,8 @@ class NewtonSystem:
         return self._direct_increment(internal, vectors, blocks, imposed)
 
     def _direct_increment(
-        self, internal: Residual, vectors: Sequence[Array], blocks: Sequence[Array], imposed: Array | None
-    ) -> tuple[Array, Array]:
+        self, internal: Residual, vectors: Sequence[Floats], blocks: Sequence[Floats], imposed: Floats | None
+    ) -> tuple[Floats, Floats]:
         rate = self.model.bulk_per_volume
         correction = (rate * internal.volume)[:, None] * internal.coupling
         residual = self.sum([vectors[0] + correction, *vectors[1:]])
@@ -104,7 +105,7 @@ class NewtonSystem:
         along = np.einsum("ei,ei->e", internal.coupling, update[self.model.dofs])
         return update, np.asarray(rate * (internal.volume + along))
 
-    def _solve(self, blocks: Sequence[Array], rhs: Array) -> Array:
+    def _solve(self, blocks: Sequence[Floats], rhs: Floats) -> Floats:
         """Factorise and solve; sparsity and analysis are made once."""
         if self._direct is None:
             assembler = Assembler(self.groups, self.free, self.total, symmetric=True)
@@ -113,7 +114,7 @@ class NewtonSystem:
         self.factorisations += 1
         return solver.solve(assembler.values(blocks), rhs)
 
-    def admissible(self, positions: Array, update: Array, least: float) -> float:
+    def admissible(self, positions: Floats, update: Floats, least: float) -> float:
         """Share of an update, 1 halved as often as needed, that keeps det F above `least` of its smallest value.
 
         Raises:

@@ -6,10 +6,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.geometry.quads import node_area_vectors
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 BackName = Literal["fixed", "slide_compression", "shear_layer", "slide_plane", "springs"]
 
 NORMAL_STIFFNESS_KPA_PER_MM = 200.0
@@ -31,8 +30,8 @@ class BackCondition:
 
     nodes: Integers
     held: NDArray[np.bool_]
-    springs: Array
-    pull_mm: Array = field(default_factory=lambda: np.zeros(3))
+    springs: Floats
+    pull_mm: Floats = field(default_factory=lambda: np.zeros(3))
 
     @property
     def holds_height(self) -> bool:
@@ -40,7 +39,7 @@ class BackCondition:
         return bool(self.held[:, 2].any() or self.springs[:, 2, 2].sum() > 1.0)
 
 
-def held_back(nodes: NDArray[np.integer], held: NDArray[np.bool_], pull_mm: Array | None = None) -> BackCondition:
+def held_back(nodes: NDArray[np.integer], held: NDArray[np.bool_], pull_mm: Floats | None = None) -> BackCondition:
     """Nodes whose components `held` ((3,) or (B, 3)) are prescribed."""
     pull = np.zeros(3) if pull_mm is None else np.asarray(pull_mm, dtype=float)
     spread = np.broadcast_to(held, (len(nodes), 3)).copy()
@@ -49,10 +48,10 @@ def held_back(nodes: NDArray[np.integer], held: NDArray[np.bool_], pull_mm: Arra
 
 def back_condition(
     name: BackName,
-    points: Array,
+    points: Floats,
     quads: NDArray[np.integer],
     tangential_kpa_per_mm: float = 0.05,
-    pull_mm: Array | None = None,
+    pull_mm: Floats | None = None,
     along_kpa_per_mm: float = 0.0,
 ) -> BackCondition:
     """The back condition of a setting.
@@ -83,7 +82,7 @@ def back_condition(
     return BackCondition(nodes, np.zeros((len(nodes), 3), dtype=bool), springs, pull)
 
 
-def _springs(points: Array, quads: Integers, nodes: Integers, tangential: float) -> Array:
+def _springs(points: Floats, quads: Integers, nodes: Integers, tangential: float) -> Floats:
     """Stiffness (B, 3, 3) in mN/mm: stiff along the nodes' normals, `tangential` across, times their share of area."""
     area = node_area_vectors(points, quads)
     size = np.linalg.norm(area[nodes], axis=1)

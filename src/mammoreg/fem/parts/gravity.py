@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.elements.hexahedra import VTK_IN_SKFEM, skfem_basis
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.sparse import Array, Integers
 from mammoreg.fem.linear.system import node_dofs
 
 STANDARD_GRAVITY = 9.80665
@@ -24,23 +24,23 @@ class Gravity:
         rest: undeformed nodes (N, 3), mm, where the potential is zero.
     """
 
-    force: Array
-    rest: Array
+    force: Floats
+    rest: Floats
 
     @property
     def dofs(self) -> Integers:
         """Degrees of freedom (N, 3)."""
         return node_dofs(np.arange(len(self.force))[:, None])
 
-    def terms(self, _positions: Array) -> tuple[Array, Array]:
+    def terms(self, _positions: Floats) -> tuple[Floats, Floats]:
         """Residual (N, 3), mN, and no stiffness."""
         return -self.force, np.zeros((len(self.force), 3, 3))
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Potential of the load."""
         return -1e-3 * float(np.sum(self.force * (positions[: len(self.force)] - self.rest)))
 
-    def renewed(self, _positions: Array) -> "Gravity":
+    def renewed(self, _positions: Floats) -> "Gravity":
         """Itself."""
         return self
 
@@ -49,7 +49,7 @@ class Gravity:
         return replace(self, force=load_factor * self.force)
 
 
-def gravity(model: HyperelasticModel, density_kg_m3: float | Array, direction: NDArray[np.floating]) -> Gravity:
+def gravity(model: HyperelasticModel, density_kg_m3: float | Floats, direction: NDArray[np.floating]) -> Gravity:
     """The weight of a body whose undeformed mesh bears no load.
 
     A breast in a prone MR scan hangs under its weight already: gravity towards the table, taken away, and gravity
@@ -76,7 +76,7 @@ def gravity(model: HyperelasticModel, density_kg_m3: float | Array, direction: N
     return Gravity(force, model.points)
 
 
-def _corner_volumes(model: HyperelasticModel) -> Array:
+def _corner_volumes(model: HyperelasticModel) -> Floats:
     """Integrals (E, 8), mm3, of the shape functions of each element."""
     basis = skfem_basis(model.points, model.hexes)
     volumes = np.empty((len(model.hexes), 8))

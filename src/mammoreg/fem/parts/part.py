@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from mammoreg.fem.linear.sparse import Array, Integers
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.linear.system import node_dofs
 from mammoreg.fem.parts.back import BackCondition
 
@@ -19,13 +19,13 @@ class Part(Protocol):
     def dofs(self) -> Integers:
         """Degrees of freedom (B, size) of the blocks: 3 * node + axis."""
 
-    def terms(self, positions: Array, /) -> tuple[Array, Array]:
+    def terms(self, positions: Floats, /) -> tuple[Floats, Floats]:
         """Residual (B, size), mN, and its symmetric derivative (B, size, size), mN/mm."""
 
-    def energy_mj(self, positions: Array, /) -> float:
+    def energy_mj(self, positions: Floats, /) -> float:
         """Stored energy or, of loads, potential: the residual is its gradient."""
 
-    def renewed(self, positions: Array, /) -> "Part":
+    def renewed(self, positions: Floats, /) -> "Part":
         """The part after a converged load step, with what it takes from there (partners, lagged state)."""
 
 
@@ -57,25 +57,25 @@ class BackSprings:
     """
 
     nodes: Integers
-    stiffness: Array
-    rest: Array
-    pull_mm: Array
+    stiffness: Floats
+    rest: Floats
+    pull_mm: Floats
 
     @property
     def dofs(self) -> Integers:
         """Degrees of freedom (B, 3)."""
         return node_dofs(self.nodes[:, None])
 
-    def terms(self, positions: Array) -> tuple[Array, Array]:
+    def terms(self, positions: Floats) -> tuple[Floats, Floats]:
         """Residual (B, 3), mN, and stiffness (B, 3, 3), mN/mm."""
         return np.einsum("bij,bj->bi", self.stiffness, self._stretch(positions)), self.stiffness
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Energy in the springs."""
         stretch = self._stretch(positions)
         return 0.5e-3 * float(np.einsum("bi,bij,bj->", stretch, self.stiffness, stretch))
 
-    def renewed(self, _positions: Array) -> "BackSprings":
+    def renewed(self, _positions: Floats) -> "BackSprings":
         """Itself."""
         return self
 
@@ -83,18 +83,18 @@ class BackSprings:
         """The springs at a load factor of the pull."""
         return replace(self, pull_mm=load_factor * self.pull_mm)
 
-    def _stretch(self, positions: Array) -> Array:
+    def _stretch(self, positions: Floats) -> Floats:
         return np.asarray(positions[self.nodes] - (self.rest + self.pull_mm))
 
 
-def back_springs(back: BackCondition | None, points: Array) -> tuple[BackSprings, ...]:
+def back_springs(back: BackCondition | None, points: Floats) -> tuple[BackSprings, ...]:
     """The springs of a back over undeformed nodes (N, 3), mm; none where it has none."""
     if back is None or not back.springs.any():
         return ()
     return (BackSprings(back.nodes, back.springs, points[back.nodes], back.pull_mm),)
 
 
-def all_nodes(points: Array, extra_nodes: Array | None) -> Array:
+def all_nodes(points: Floats, extra_nodes: Floats | None) -> Floats:
     """Undeformed nodes (N + M, 3) of a body and behind them the extra ones.
 
     Raises:

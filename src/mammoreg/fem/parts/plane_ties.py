@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.linear.sparse import Array, Integers
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.linear.system import node_dofs
 
 
@@ -22,10 +22,10 @@ class PlaneTies:
     """
 
     nodes: NDArray[np.int64]
-    shape: Array
-    direction: Array
-    offset: Array
-    stiffness: Array
+    shape: Floats
+    direction: Floats
+    offset: Floats
+    stiffness: Floats
 
     def kept(self, which: NDArray[np.bool_]) -> "PlaneTies":
         """Those of the ties that a mask (T,) selects."""
@@ -43,11 +43,11 @@ class PlaneTies:
             np.concatenate([self.stiffness, other.stiffness]),
         )
 
-    def points(self, positions: Array) -> Array:
+    def points(self, positions: Floats) -> Floats:
         """The tied points (T, 3) at deformed nodes (N, 3), mm."""
         return np.asarray(np.einsum("ta,tai->ti", self.shape, positions[self.nodes]))
 
-    def distance(self, positions: Array) -> Array:
+    def distance(self, positions: Floats) -> Floats:
         """Distance (T,) of the points from their planes at deformed nodes (N, 3), mm."""
         return np.asarray(np.einsum("ti,ti->t", self.points(positions), self.direction) - self.offset)
 
@@ -56,27 +56,27 @@ class PlaneTies:
         """Degrees of freedom (T, 12) of the faces' corners."""
         return node_dofs(self.nodes)
 
-    def terms(self, positions: Array) -> tuple[Array, Array]:
+    def terms(self, positions: Floats) -> tuple[Floats, Floats]:
         """Residual (T, 12), mN, and stiffness (T, 12, 12), mN/mm."""
         return self.force(positions), self.blocks()
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Energy in the springs."""
         return 0.5e-3 * float(np.sum(self.stiffness * self.distance(positions) ** 2))
 
-    def renewed(self, _positions: Array) -> "PlaneTies":
+    def renewed(self, _positions: Floats) -> "PlaneTies":
         """Itself."""
         return self
 
-    def force(self, positions: Array) -> Array:
+    def force(self, positions: Floats) -> Floats:
         """Residual (T, 12) in mN."""
         pull = self.stiffness * self.distance(positions)
         return np.asarray(self._rows() * pull[:, None])
 
-    def blocks(self) -> Array:
+    def blocks(self) -> Floats:
         """Stiffness (T, 12, 12) in mN/mm, constant."""
         rows = self._rows()
         return np.asarray(self.stiffness[:, None, None] * rows[:, :, None] * rows[:, None, :])
 
-    def _rows(self) -> Array:
+    def _rows(self) -> Floats:
         return np.asarray((self.shape[:, :, None] * self.direction[:, None, :]).reshape(len(self.nodes), 12))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mammoreg.fem.linear.sparse import Array, Integers
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.linear.system import node_dofs
 
 
@@ -22,21 +22,21 @@ class PointTies:
     """
 
     nodes: Integers
-    shape: Array
-    rest: Array
-    target: Array
-    stiffness: Array
+    shape: Floats
+    rest: Floats
+    target: Floats
+    stiffness: Floats
 
     @property
     def dofs(self) -> Integers:
         """Degrees of freedom (T, 12) of the faces' corners."""
         return node_dofs(self.nodes)
 
-    def points(self, positions: Array) -> Array:
+    def points(self, positions: Floats) -> Floats:
         """The tied points (T, 3) at deformed nodes (N, 3), mm."""
         return np.asarray(np.einsum("ta,tai->ti", self.shape, positions[self.nodes]))
 
-    def terms(self, positions: Array) -> tuple[Array, Array]:
+    def terms(self, positions: Floats) -> tuple[Floats, Floats]:
         """Residual (T, 12), mN, and stiffness (T, 12, 12), mN/mm."""
         pull = self.stiffness[:, None] * (self.points(positions) - self.target)
         force = self.shape[:, :, None] * pull[:, None, :]
@@ -44,11 +44,11 @@ class PointTies:
         blocks = stiffness[:, :, None, :, None] * np.eye(3)[None, None, :, None, :]
         return force.reshape(-1, 12), blocks.reshape(-1, 12, 12)
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Energy in the springs."""
         return 0.5e-3 * float(self.stiffness @ ((self.points(positions) - self.target) ** 2).sum(axis=1))
 
-    def renewed(self, _positions: Array) -> "PointTies":
+    def renewed(self, _positions: Floats) -> "PointTies":
         """Itself."""
         return self
 
@@ -58,7 +58,7 @@ class PointTies:
 
 
 def point_ties(
-    points: Array, corners: NDArray[np.integer], weights: Array, targets: Array, stiffness: float | Array
+    points: Floats, corners: NDArray[np.integer], weights: Floats, targets: Floats, stiffness: float | Floats
 ) -> PointTies:
     """Ties of points given by the faces that carry them.
 

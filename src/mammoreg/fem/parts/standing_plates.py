@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, SoftMemory, SoftTerms
-from mammoreg.fem.linear.sparse import Array, Integers
 from mammoreg.fem.linear.system import node_dofs
 
 
@@ -32,16 +32,16 @@ class StandingPlates:
         """Degrees of freedom (F, 12) of the faces' corners."""
         return node_dofs(self.contact.surface.quads)
 
-    def terms(self, positions: Array) -> tuple[Array, Array]:
+    def terms(self, positions: Floats) -> tuple[Floats, Floats]:
         """Residual (F, 12), mN, and stiffness (F, 12, 12), mN/mm."""
         found = self._contact(positions)
         return found.force[:, :12], found.stiffness[:, :12, :12]
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Potential of the pressure and of friction with its lagged limit."""
         return self.contact.energy_mj(positions, self.height_mm, self.plates, self.memory)
 
-    def renewed(self, positions: Array) -> "StandingPlates":
+    def renewed(self, positions: Floats) -> "StandingPlates":
         """The plates after a converged step, whose pressure limits friction in the next one."""
         found = self._contact(positions)
         memory = self.contact.remember(positions, self.plates, self.height_mm, found, self.memory)
@@ -52,11 +52,11 @@ class StandingPlates:
         free = np.asarray(~np.isin(self.contact.surface.quads, nodes).all(axis=1))
         return replace(self, contact=self.contact.part(free), memory=self.memory.part(free))
 
-    def penetration_mm(self, positions: Array) -> float:
+    def penetration_mm(self, positions: Floats) -> float:
         """How deep the deepest contact point lies in a plate."""
         return max(0.0, self._contact(positions).penetration_mm)
 
-    def force_n(self, positions: Array, reaction_n: Array, nodes: NDArray[np.integer]) -> tuple[float, float]:
+    def force_n(self, positions: Floats, reaction_n: Floats, nodes: NDArray[np.integer]) -> tuple[float, float]:
         """Size of the lower and the upper plate's force along the compression.
 
         The plates' force on faces whose corners are all prescribed is part of what holds these corners.
@@ -75,5 +75,5 @@ class StandingPlates:
             sizes.append(abs(1e-3 * float(pressed_mn) + float(reaction_n[holding, 2].sum())))
         return sizes[0], sizes[1]
 
-    def _contact(self, positions: Array) -> SoftTerms:
+    def _contact(self, positions: Floats) -> SoftTerms:
         return self.contact.terms(positions, self.height_mm, self.plates, self.memory)

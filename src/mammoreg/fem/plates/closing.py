@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, plate_pair, touching
 from mammoreg.contact.surface import ContactSurface
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.parts.part import Part, all_nodes
 from mammoreg.fem.plates.equilibrium import DampedEquilibrium
@@ -81,7 +81,7 @@ class Closing:
         options: ClosingOptions | None = None,
         lower_mm: float | None = None,
         parts: Sequence[Part] = (),
-        extra_nodes: Array | None = None,
+        extra_nodes: Floats | None = None,
         moving: Moving = "both",
     ) -> None:
         if moving != "both" and lower_mm is not None:

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.sparse import Array, Integers
 from mammoreg.fem.linear.system import NewtonSystem, node_dofs
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.parts.part import Part, Parts, all_nodes, back_springs, parts_at
@@ -51,7 +51,7 @@ class DampedEquilibrium:
         *,
         free_height: bool,
         parts: Sequence[Part] = (),
-        extra_nodes: Array | None = None,
+        extra_nodes: Floats | None = None,
     ) -> None:
         self.model, self.back, self.contact = model, back, contact
         self.points = all_nodes(model.points, extra_nodes)
@@ -72,7 +72,7 @@ class DampedEquilibrium:
         other.contact = contact
         return other
 
-    def anchors(self, load_factor: float) -> Array:
+    def anchors(self, load_factor: float) -> Floats:
         """Where held components (N, 3) stand at a load factor of the pull."""
         anchors = self.points.copy()
         anchors[self.back.nodes] += load_factor * self.back.pull_mm
@@ -97,7 +97,7 @@ class DampedEquilibrium:
         else:
             self._prepare(parts)
 
-    def _weight(self) -> Array:
+    def _weight(self) -> Floats:
         """Damping (total,) per unit of the damping factor, mN/mm: mu times the node's share of volume over h^2."""
         volume = np.bincount(self.model.hexes.ravel(), weights=np.repeat(self.model.volume / 8.0, 8))
         mu = self.model.mean_mu_kpa

@@ -6,10 +6,11 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.hierarchy import Array, Hierarchy, Integers, block_size, interpolate_elements, interpolation
+from mammoreg.fem.linear.hierarchy import Hierarchy, block_size, interpolate_elements, interpolation
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.plates.closing import Closed, Closing
 from mammoreg.fem.plates.state import DampedState
@@ -121,7 +122,7 @@ def _carried(closed: Closed, coarse: Closing, fine: Closing) -> DampedState:
     return DampedState(positions, pressure, closed.state.height, _carried_memory(closed, coarse, fine, positions))
 
 
-def _carried_memory(closed: Closed, coarse: Closing, fine: Closing, positions: Array) -> SoftMemory:
+def _carried_memory(closed: Closed, coarse: Closing, fine: Closing, positions: Floats) -> SoftMemory:
     """What the contact points remember, from those nearest on the undeformed skin."""
     plates, height, old = fine.plates(closed.gap_mm), closed.state.height, closed.state.memory
     memory = fine.contact.start(positions, plates, height)
@@ -132,7 +133,7 @@ def _carried_memory(closed: Closed, coarse: Closing, fine: Closing, positions: A
     weights = 1.0 / (np.asarray(distance) + 1e-9)
     weights /= weights.sum(axis=1, keepdims=True)
 
-    def carried(values: Array) -> Array:
+    def carried(values: Floats) -> Floats:
         flat = values.reshape(len(plates), len(there), -1)
         mixed = np.einsum("nk,pnkc->pnc", weights, flat[:, nearest])
         return np.asarray(mixed.reshape(len(plates), *memory.pressure.shape[1:], *values.shape[3:]))

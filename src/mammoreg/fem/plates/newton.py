@@ -14,26 +14,28 @@ from typing import Protocol
 
 import numpy as np
 
+from mammoreg.arrays import Floats
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftContact, SoftTerms
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel, Residual
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.linear.system import NewtonSystem
 from mammoreg.fem.parts.part import Parts
 from mammoreg.fem.plates.state import DampedState, Load
 from mammoreg.fem.report import Stopwatch
 
+# All chosen: they change how an equilibrium is reached, not the equilibrium.
 LEAST_DET_RATIO = 0.2  # a Newton step may shrink the smallest det F to this part of itself
-RUNAWAY_MM = 200.0
+RUNAWAY_MM = 200.0  # an update beyond the size of a breast is searched along
 CONTRACTING = 0.6  # an update above this share of the last one is searched along
-PLAIN_ITERATIONS, ITERATIONS = 14, 40
+PLAIN_ITERATIONS, ITERATIONS = 14, 40  # at most without a line search, and at most
 MERIT_BULK = 20.0  # bulk modulus of the merit at most, in shear moduli
 LARGEST_MM = 30.0  # of a searched update
 DESCENT = 1e-4  # share of the expected descent that is enough
-SHORTEST = 1.0 / 64.0
+SHORTEST = 1.0 / 64.0  # step length at which a line search gives up
+# Further damping where an update points uphill, in units of the damping's weight: first, least kept, factor, trials.
 SHIFT, LEAST_SHIFT, SHIFT_GROWTH, SHIFTS = 0.1, 0.01, 5.0, 8
-SHORT = 0.2
+SHORT = 0.2  # a shorter step length asks for more of it
 
 
 @dataclass(frozen=True)
@@ -41,8 +43,8 @@ class ForceBalance:
     """Forces at a state: the elements' residual, and residual and tangent of each group of blocks."""
 
     internal: Residual
-    vectors: list[Array]
-    blocks: list[Array]
+    vectors: list[Floats]
+    blocks: list[Floats]
 
 
 class StepEquations(Protocol):
@@ -53,7 +55,7 @@ class StepEquations(Protocol):
     watch: Stopwatch
     contact: SoftContact
     springs: Parts
-    weight: Array
+    weight: Floats
     residuals: list[float]
 
     def terms(self, state: DampedState, plates: Sequence[Plate]) -> SoftTerms:
@@ -103,7 +105,7 @@ class DampedStep:
             last = largest
         return state, f"no equilibrium within {ITERATIONS} Newton iterations (last update {last:.2g} mm)"
 
-    def _plain_step_length(self, state: DampedState, update: Array, largest: float, last: float) -> float:
+    def _plain_step_length(self, state: DampedState, update: Floats, largest: float, last: float) -> float:
         """Step length of an update that needs no line search; 0: it has to be searched along."""
         if self.shift > 0.0 or largest > RUNAWAY_MM or largest > CONTRACTING * last:
             return 0.0
@@ -130,11 +132,11 @@ class DampedStep:
         """Ratio of unbalanced to internal forces at a state."""
         return self.system.unbalance(self._balance(state).vectors)
 
-    def _displacement(self, state: DampedState) -> Array:
+    def _displacement(self, state: DampedState) -> Floats:
         """Displacement (total,) since the start."""
         return np.append((state.positions - self.start.positions).ravel(), state.height - self.start.height)
 
-    def _line_search(self, state: DampedState, balance: ForceBalance, update: Array, pressure: Array) -> DampedState:
+    def _line_search(self, state: DampedState, balance: ForceBalance, update: Floats, pressure: Floats) -> DampedState:
         """Backtracking line search for less of the merit, along updates that are damped more until there is some."""
         gradient = self._gradient(balance)
         merit = self._merit(state.positions, state.height, state.pressure)
@@ -156,7 +158,7 @@ class DampedStep:
         elif step_length == 1.0:
             self.shift = self.shift / SHIFT_GROWTH if self.shift > LEAST_SHIFT else 0.0
 
-    def _update(self, balance: ForceBalance) -> tuple[Array, Array]:
+    def _update(self, balance: ForceBalance) -> tuple[Floats, Floats]:
         """Newton's update, with more damping towards the present place where that has turned out to be needed."""
         blocks = list(balance.blocks)
         if self.shift > 0.0:
@@ -165,7 +167,7 @@ class DampedStep:
         with self.watch.timing("linear"):
             return self.system.increment(balance.internal, balance.vectors, blocks)
 
-    def _descending(self, state: DampedState, update: Array, slope: float, merit: float) -> float:
+    def _descending(self, state: DampedState, update: Floats, slope: float, merit: float) -> float:
         """Step length at which the merit has lessened (Armijo); 0: there is none."""
         before = self.model.determinants(state.positions)
         step_length = min(1.0, LARGEST_MM / float(np.abs(update).max()))
@@ -178,19 +180,19 @@ class DampedStep:
             step_length *= 0.5
         return 0.0
 
-    def _soft_bulk(self) -> Array:
+    def _soft_bulk(self) -> Floats:
         """Stiffness (E,) of the merit's volume term, kPa/mm3: as of the bulk modulus in series with a moderate one."""
         material = self.model.material
         moderate = MERIT_BULK * material.mu_kpa
         return np.asarray(material.bulk_kpa * moderate / (material.bulk_kpa + moderate) / self.model.volume)
 
-    def _gradient(self, balance: ForceBalance) -> Array:
+    def _gradient(self, balance: ForceBalance) -> Floats:
         """Gradient (total,) of the merit, mN."""
         internal = balance.internal
         volumetric = (self._soft_bulk() * internal.volume)[:, None] * internal.coupling
         return self.system.sum([balance.vectors[0] + volumetric, *balance.vectors[1:]])
 
-    def _merit(self, positions: Array, height: float, pressure: Array) -> float:
+    def _merit(self, positions: Floats, height: float, pressure: Floats) -> float:
         """Potential, mN mm, of nodes (N, 3) at element pressures (E,)."""
         contact = self.equilibrium.contact.energy_mj(positions, height, self.load.plates, self.start.memory)
         stored = self.model.energy_mj(positions) + contact + sum(part.energy_mj(positions) for part in self.acting)
@@ -200,7 +202,7 @@ class DampedStep:
         displacement = np.append((positions - self.start.positions).ravel(), height - self.start.height)
         return 1e3 * stored + volume + 0.5 * self.damping * float(self.equilibrium.weight @ displacement**2)
 
-    def _blame(self, state: DampedState, update: Array) -> str:
+    def _blame(self, state: DampedState, update: Floats) -> str:
         """Which element is the first to turn inside out along an update, or that none is."""
         before = self.model.determinants(state.positions)
         after = self.model.determinants(state.positions + SHORTEST * update[:-1].reshape(-1, 3))
@@ -212,7 +214,7 @@ class DampedStep:
         return f"no way downhill; most strained is {place} with det F {before[worst].min():.2g}"
 
 
-def _moved(state: DampedState, step_length: float, update: Array, pressure: Array) -> DampedState:
+def _moved(state: DampedState, step_length: float, update: Floats, pressure: Floats) -> DampedState:
     return replace(
         state,
         positions=state.positions + step_length * update[:-1].reshape(-1, 3),

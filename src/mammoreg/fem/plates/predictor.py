@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mammoreg.contact.plate import Array, Plate
-from mammoreg.fem.parts.back import BackCondition, Integers
+from mammoreg.arrays import Floats, Integers
+from mammoreg.contact.plate import Plate
+from mammoreg.fem.parts.back import BackCondition
 
 FADE_MM = 25.0
 """Distance over which the squeeze fades out behind the plates' edge, and the spread in front of a held back."""
@@ -22,10 +23,10 @@ class AffinePredictor:
         body: how many of the nodes are the body's, about whose middle and root the spread is.
     """
 
-    reach: Array
+    reach: Floats
     body: int
 
-    def predict(self, positions: Array, height: float, plates: Sequence[Plate], ratio: float) -> Array:
+    def predict(self, positions: Floats, height: float, plates: Sequence[Plate], ratio: float) -> Floats:
         """Nodes (N, 3) for plates (lower, upper) whose gap has shrunk by `ratio`, both shifted by `height`."""
         lower, upper = plates
         low, high = lower.height_mm + height, upper.height_mm + height
@@ -46,7 +47,7 @@ class AffinePredictor:
         return moved
 
 
-def affine_predictor(points: Array, back: BackCondition, body: int) -> AffinePredictor:
+def affine_predictor(points: Floats, back: BackCondition, body: int) -> AffinePredictor:
     """Predictor of nodes (N, 3), the first `body` of them the body's.
 
     The spread grows from zero at nodes held across the plates' direction.

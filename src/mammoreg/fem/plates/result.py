@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mammoreg.arrays import Floats
 from mammoreg.contact.soft import SoftTerms
 from mammoreg.errors import NotConvergedError
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.parts.part import parts_at
 from mammoreg.fem.plates.equilibrium import DampedEquilibrium
 from mammoreg.fem.plates.state import DampedState, Load
@@ -37,7 +37,7 @@ class Closed:
         contact: pressures and friction at rest, where there was a solve.
     """
 
-    deformed: Array
+    deformed: Floats
     height_mm: float
     gap_mm: float
     force_n: tuple[float, float]
@@ -51,7 +51,7 @@ class Closed:
     penetration_mm: float
     energy_mj: float
     state: DampedState
-    extra: Array | None = None
+    extra: Floats | None = None
     report: SolveReport | None = None
     contact: SoftTerms | None = None
 

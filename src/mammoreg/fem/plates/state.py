@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from mammoreg.arrays import Floats
 from mammoreg.contact.plate import Plate
 from mammoreg.contact.soft import SoftMemory
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.parts.part import Parts
 
 
@@ -20,8 +20,8 @@ class DampedState:
         parts: as they were renewed here; None: as the equilibrium has them at first.
     """
 
-    positions: Array
-    pressure: Array
+    positions: Floats
+    pressure: Floats
     height: float
     memory: SoftMemory
     parts: Parts | None = None

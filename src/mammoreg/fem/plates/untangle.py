@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.prescribed.linear_elastic import LinearElasticBody
 from mammoreg.materials.elastic import neo_hookean
 
@@ -12,7 +12,7 @@ RINGS = (0, 1, 2)
 _COMPRESSIBLE = neo_hookean(1.0, 0.3)
 
 
-def untangled(model: HyperelasticModel, positions: Array, held: NDArray[np.bool_], least: float) -> Array:
+def untangled(model: HyperelasticModel, positions: Floats, held: NDArray[np.bool_], least: float) -> Floats:
     """Nodes (N, 3) whose elements are squeezed to det F below `least` less, if that can be had.
 
     The nodes of such elements, and of rings around them, take the small-strain equilibrium between the others.
@@ -36,8 +36,8 @@ def untangled(model: HyperelasticModel, positions: Array, held: NDArray[np.bool_
 
 
 def _relaxed(
-    model: HyperelasticModel, positions: Array, held: NDArray[np.bool_], folded: NDArray[np.int64], rings: int
-) -> Array:
+    model: HyperelasticModel, positions: Floats, held: NDArray[np.bool_], folded: NDArray[np.int64], rings: int
+) -> Floats:
     free = np.zeros(len(model.points), dtype=bool)
     free[model.hexes[folded]] = True
     for _ in range(rings):

@@ -6,9 +6,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, PrescribedState
 from mammoreg.materials.cube import CUBE_MM3
 from mammoreg.materials.elastic import hyperelastic
@@ -37,7 +37,7 @@ class PressedCube:
     """
 
     force_n: float
-    deformed: Array
+    deformed: Floats
     iterations: int
     steps: int
     cuts: int
@@ -83,7 +83,7 @@ def press_cube(
     )
 
 
-def _in_steps(equilibrium: Equilibrium, state: PrescribedState, goal: Array) -> tuple[PrescribedState, int, int]:
+def _in_steps(equilibrium: Equilibrium, state: PrescribedState, goal: Floats) -> tuple[PrescribedState, int, int]:
     """Move the held components to their goal, in steps that follow the iterations' ease."""
     origin, done, step, steps, cuts = state.positions, 0.0, FIRST_STEP, 0, 0
     while done < 1.0:

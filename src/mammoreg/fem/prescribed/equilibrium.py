@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel, Residual
-from mammoreg.fem.linear.sparse import Array
 from mammoreg.fem.linear.system import NewtonSystem
 from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.parts.part import Part, Parts, all_nodes, back_springs, parts_at
@@ -37,8 +37,8 @@ class NewtonOptions:
 class PrescribedState:
     """A deformation: nodes (N, 3), mm, extra ones behind the body's, and element pressures (E,), kPa."""
 
-    positions: Array
-    pressure: Array
+    positions: Floats
+    pressure: Floats
 
 
 class Equilibrium:
@@ -63,7 +63,7 @@ class Equilibrium:
         held: NDArray[np.bool_],
         back: BackCondition | None = None,
         parts: Sequence[Part] = (),
-        extra_nodes: Array | None = None,
+        extra_nodes: Floats | None = None,
     ) -> None:
         self.model, self.held = model, held
         self.parts: Parts = (*back_springs(back, all_nodes(model.points, extra_nodes)), *parts)
@@ -76,7 +76,7 @@ class Equilibrium:
         return NewtonSystem(self.model, groups, np.flatnonzero(~self.held.ravel()), self.held.size)
 
     def solve(
-        self, start: PrescribedState, targets: Array, options: NewtonOptions, load_factor: float = 1.0
+        self, start: PrescribedState, targets: Floats, options: NewtonOptions, load_factor: float = 1.0
     ) -> PrescribedState:
         """Find the equilibrium whose held components stand at their targets (N, 3), mm; then renew the parts.
 
@@ -92,7 +92,7 @@ class Equilibrium:
         state, last = start, np.inf
         acting = parts_at(self.parts, load_factor)
         pending = np.where(self.held, targets - start.positions, 0.0).ravel()
-        imposed: Array | None = pending if pending.any() else None
+        imposed: Floats | None = pending if pending.any() else None
         for _ in range(options.iterations):
             with self.watch.timing("assembly"):
                 internal, vectors, blocks = self._terms(state, acting)
@@ -114,7 +114,7 @@ class Equilibrium:
             last = admissible * float(np.abs(update).max())
         raise NotConvergedError(f"no equilibrium within {options.iterations} Newton iterations (residual {ratio:.1e})")
 
-    def reaction(self, state: PrescribedState, load_factor: float = 1.0) -> Array:
+    def reaction(self, state: PrescribedState, load_factor: float = 1.0) -> Floats:
         """Force (N, 3) in mN that holds the nodes in a state."""
         return self.system.sum(self._terms(state, parts_at(self.parts, load_factor))[1]).reshape(-1, 3)
 
@@ -130,7 +130,7 @@ class Equilibrium:
         ):
             self.system = self._system()
 
-    def _terms(self, state: PrescribedState, acting: Parts) -> tuple[Residual, list[Array], list[Array]]:
+    def _terms(self, state: PrescribedState, acting: Parts) -> tuple[Residual, list[Floats], list[Floats]]:
         """The elements' residual, and residual and tangent of each group."""
         elements = self.model.state(state.positions)
         internal = self.model.residual(elements, state.pressure)

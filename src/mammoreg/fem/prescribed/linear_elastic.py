@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.linear.direct import linear_solver
-from mammoreg.fem.linear.sparse import Array, Assembler
+from mammoreg.fem.linear.sparse import Assembler
 
 
 @dataclass(frozen=True)
@@ -24,9 +25,9 @@ class SmallStrain:
         reaction: forces (N, 3) at held components, mN; zero elsewhere.
     """
 
-    displacement: Array
-    pressure: Array
-    reaction: Array
+    displacement: Floats
+    pressure: Floats
+    reaction: Floats
 
 
 class LinearElasticBody:
@@ -52,7 +53,7 @@ class LinearElasticBody:
         """So far: one, however many loads are solved."""
         return self._solver.factorisations
 
-    def solve(self, prescribed: Array | None = None, force: Array | None = None) -> SmallStrain:
+    def solve(self, prescribed: Floats | None = None, force: Floats | None = None) -> SmallStrain:
         """Displacements under a load.
 
         Args:
@@ -73,7 +74,7 @@ class LinearElasticBody:
         pressure = self.model.bulk_per_volume * dilatation
         return SmallStrain(displacement.reshape(-1, 3), pressure, reaction.reshape(-1, 3))
 
-    def _product(self, displacement: Array) -> Array:
+    def _product(self, displacement: Floats) -> Floats:
         """Stiffness times displacements (3 N,)."""
         forces = np.einsum("eij,ej->ei", self._blocks, displacement[self.model.dofs])
         return np.asarray(np.bincount(self.model.dofs.ravel(), forces.ravel(), displacement.size), dtype=float)

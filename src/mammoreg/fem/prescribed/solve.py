@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.elements.model import HyperelasticModel
-from mammoreg.fem.parts.back import Array, BackCondition
+from mammoreg.fem.parts.back import BackCondition
 from mammoreg.fem.parts.part import Part, all_nodes
 from mammoreg.fem.prescribed.equilibrium import Equilibrium, NewtonOptions, PrescribedState
 from mammoreg.fem.report import SolveReport, solve_report
@@ -48,8 +49,8 @@ class PrescribedResult:
         report: of the solve.
     """
 
-    deformed: Array
-    pressure: Array
+    deformed: Floats
+    pressure: Floats
     iterations: int
     steps: int
     cuts: int
@@ -57,22 +58,22 @@ class PrescribedResult:
     energy_mj: float
     min_det_f: float
     volume_change: float
-    reaction_n: Array
-    node_reaction_n: Array
-    extra: Array | None = None
+    reaction_n: Floats
+    node_reaction_n: Floats
+    extra: Floats | None = None
     report: SolveReport | None = None
 
 
 def solve_prescribed(
     model: HyperelasticModel,
     nodes: NDArray[np.integer],
-    targets: Array,
+    targets: Floats,
     back: BackCondition | None = None,
-    start: Array | None = None,
-    pressure: Array | None = None,
+    start: Floats | None = None,
+    pressure: Floats | None = None,
     options: PrescribedOptions | None = None,
     parts: Sequence[Part] = (),
-    extra_nodes: Array | None = None,
+    extra_nodes: Floats | None = None,
 ) -> PrescribedResult:
     """Move nodes (B,) to targets (B, 3), mm, in steps; the rest finds its equilibrium.
 
@@ -151,8 +152,8 @@ def _result(
 
 
 def _held(
-    points: Array, nodes: NDArray[np.integer], targets: Array, back: BackCondition | None
-) -> tuple[NDArray[np.bool_], Array]:
+    points: Floats, nodes: NDArray[np.integer], targets: Floats, back: BackCondition | None
+) -> tuple[NDArray[np.bool_], Floats]:
     """Held components (N, 3) and where they end (N, 3)."""
     held = np.zeros(points.shape, dtype=bool)
     goal = points.copy()

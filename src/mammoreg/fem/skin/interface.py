@@ -19,8 +19,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.linear.system import node_dofs
-from mammoreg.fem.skin.surface import Array, Integers, QuadSurface
+from mammoreg.fem.skin.surface import QuadSurface
 
 ONSET_MM = 0.05
 """Half the depth over which the barrier's stiffness grows to its whole value."""
@@ -50,14 +51,14 @@ class SkinInterface:
 
     surface: QuadSurface
     nodes: Integers
-    area: Array
+    area: Floats
     stiffness: float
     cling: float
     drag: float
     adherent: bool
     face: Integers
-    shape: Array
-    normal: Array
+    shape: Floats
+    normal: Floats
     stuck: NDArray[np.bool_]
 
     @property
@@ -65,7 +66,7 @@ class SkinInterface:
         """Degrees of freedom (M, 15): the node's and the four corners' of its foot's face."""
         return node_dofs(np.column_stack([self.nodes, self.surface.quads[self.face]]))
 
-    def terms(self, positions: Array) -> tuple[Array, Array]:
+    def terms(self, positions: Floats) -> tuple[Floats, Floats]:
         """Residual (M, 15), mN, and stiffness (M, 15, 15), mN/mm, at nodes (N, 3)."""
         apart = self._apart(positions)
         gap = self._along(apart)
@@ -80,7 +81,7 @@ class SkinInterface:
         blocks = weights[:, :, None, :, None] * stiff[:, None, :, None, :]
         return force.reshape(-1, 15), blocks.reshape(-1, 15, 15)
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Energy of the barrier and of the springs that hold stuck skin, mJ."""
         apart = self._apart(positions)
         gap = self._along(apart)
@@ -92,7 +93,7 @@ class SkinInterface:
         density += 0.5 * np.where(self.stuck, self.stiffness, self.drag) * (slip**2).sum(axis=1)
         return 1e-3 * float((self.area * density).sum())
 
-    def renewed(self, positions: Array) -> "SkinInterface":
+    def renewed(self, positions: Floats) -> "SkinInterface":
         """With feet, normals and sticking places as at converged nodes (N, 3)."""
         foot = self.surface.project(positions[self.nodes], positions, self.face)
         fresh = replace(self, face=foot.face, shape=foot.shape, normal=foot.normal)
@@ -106,18 +107,18 @@ class SkinInterface:
         normal = np.where(kept[:, None], turned.normal, fresh.normal)
         return replace(fresh, face=face, shape=shape, normal=normal, stuck=fresh.gap_mm(positions) < TOUCH_MM)
 
-    def gap_mm(self, positions: Array) -> Array:
+    def gap_mm(self, positions: Floats) -> Floats:
         """Distance (M,) of the nodes from their feet, negative where skin and body overlap."""
         return self._along(self._apart(positions))
 
-    def _apart(self, positions: Array) -> Array:
+    def _apart(self, positions: Floats) -> Floats:
         corners = positions[self.surface.quads[self.face]]
         return np.asarray(positions[self.nodes] - np.einsum("ma,mai->mi", self.shape, corners))
 
-    def _along(self, apart: Array) -> Array:
+    def _along(self, apart: Floats) -> Floats:
         return np.asarray(np.einsum("mi,mi->m", apart, self.normal))
 
-    def _barrier(self, gap: Array) -> tuple[Array, Array]:
+    def _barrier(self, gap: Floats) -> tuple[Floats, Floats]:
         """Pressure (M,), kPa, and minus its derivative by the gap, kPa/mm."""
         depth = np.clip(-gap, 0.0, 2.0 * ONSET_MM)
         slope = self.stiffness * depth / (2.0 * ONSET_MM)
@@ -126,7 +127,7 @@ class SkinInterface:
 
 
 def skin_interface(
-    points: Array,
+    points: Floats,
     body_quads: NDArray[np.integer],
     skin_quads: NDArray[np.integer],
     stiffness: float,

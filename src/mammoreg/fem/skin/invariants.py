@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mammoreg.arrays import Floats
 
 _TO_STRAIN = np.array([2.0, 2.0, 1.0])
 """(C11, C22, C12) changes by this times the Green strain (E11, E22, 2 E12)."""
@@ -36,12 +36,12 @@ class Invariant:
         hessian: (..., 3, 3), symmetric.
     """
 
-    value: Array
-    gradient: Array
-    hessian: Array
+    value: Floats
+    gradient: Floats
+    hessian: Floats
 
 
-def full_invariant(stretch: Array) -> Invariant:
+def full_invariant(stretch: Floats) -> Invariant:
     """I1 = tr C + 1/det C of in-plane tensors C as (..., 3): C11, C22, C12."""
     c11, c22, c12 = stretch[..., 0], stretch[..., 1], stretch[..., 2]
     inverse = 1.0 / (c11 * c22 - c12**2)
@@ -51,7 +51,7 @@ def full_invariant(stretch: Array) -> Invariant:
     return _by_strain(c11 + c22 + inverse, gradient, hessian)
 
 
-def relaxed_invariant(stretch: Array) -> Invariant:
+def relaxed_invariant(stretch: Floats) -> Invariant:
     """I1 of the membrane that wrinkles, of in-plane tensors C as (..., 3): C11, C22, C12."""
     middle = 0.5 * (stretch[..., 0] + stretch[..., 1])
     difference = stretch @ _HALF_DIFFERENCE
@@ -67,7 +67,7 @@ def relaxed_invariant(stretch: Array) -> Invariant:
     )
 
 
-def _uniaxial(stretch: Array, largest: Array, difference: Array, radius: Array) -> Invariant:
+def _uniaxial(stretch: Floats, largest: Floats, difference: Floats, radius: Floats) -> Invariant:
     """I1 = c + 2 c^-1/2 of the largest eigenvalue c; the eigenvalues differ by twice the radius."""
     cosine, sine = (difference / radius)[..., None], (stretch[..., 2] / radius)[..., None]
     along = _MEAN + cosine * _HALF_DIFFERENCE + sine * _SHEAR
@@ -77,14 +77,14 @@ def _uniaxial(stretch: Array, largest: Array, difference: Array, radius: Array) 
     return _by_strain(largest + 2.0 * largest**-0.5, slope[..., None] * along, hessian)
 
 
-def _by_strain(value: Array, gradient: Array, hessian: Array) -> Invariant:
+def _by_strain(value: Floats, gradient: Floats, hessian: Floats) -> Invariant:
     return Invariant(value, gradient * _TO_STRAIN, hessian * _TO_STRAIN[:, None] * _TO_STRAIN)
 
 
-def _chosen(first: NDArray[np.bool_], one: Array, second: NDArray[np.bool_], other: Array) -> Array:
+def _chosen(first: NDArray[np.bool_], one: Floats, second: NDArray[np.bool_], other: Floats) -> Floats:
     spread = (...,) + (None,) * (one.ndim - first.ndim)
     return np.where(first[spread], one, np.where(second[spread], other, 0.0))
 
 
-def _dyad(vector: Array) -> Array:
+def _dyad(vector: Floats) -> Floats:
     return np.asarray(vector[..., :, None] * vector[..., None, :])

@@ -7,9 +7,8 @@ I1 = l^2 + 2/l and incompressibility W(I1) = E/2 (l - 1)^2. It goes on beyond th
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from mammoreg.arrays import Floats
 
 SKIN_MODULUS_KPA = 10.0
 LEAST_INVARIANT = 3.0 + 1e-7
@@ -31,16 +30,16 @@ class TensionLinear:
         """Initial shear modulus."""
         return self.e_kpa / 3.0
 
-    def energy_kpa(self, i1: Array) -> Array:
+    def energy_kpa(self, i1: Floats) -> Floats:
         """W at invariants of any shape."""
         return np.asarray(0.5 * self.e_kpa * (_uniaxial_stretch(i1) - 1.0) ** 2)
 
-    def slope_kpa(self, i1: Array) -> Array:
+    def slope_kpa(self, i1: Floats) -> Floats:
         """dW/dI1 = E/2 l^2 / (l^2 + l + 1)."""
         stretch = _uniaxial_stretch(i1)
         return np.asarray(0.5 * self.e_kpa * stretch**2 / (stretch**2 + stretch + 1.0))
 
-    def curvature_kpa(self, i1: Array) -> Array:
+    def curvature_kpa(self, i1: Floats) -> Floats:
         """d2W/dI1^2."""
         invariant = np.maximum(i1, LEAST_INVARIANT)
         stretch = _uniaxial_stretch(invariant)
@@ -48,7 +47,7 @@ class TensionLinear:
         return np.asarray(by_stretch * stretch / (3.0 * stretch**2 - invariant))
 
 
-def _uniaxial_stretch(i1: Array) -> Array:
+def _uniaxial_stretch(i1: Floats) -> Floats:
     """The root l >= 1 of l^2 + 2/l = I1."""
     invariant = np.maximum(i1, 3.0)
     angle = np.arccos(-((3.0 / invariant) ** 1.5))

@@ -8,16 +8,15 @@ applies, with a small share of the unrelaxed one that keeps a slack membrane fro
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.linear.system import node_dofs
-from mammoreg.fem.skin.invariants import Array, full_invariant, relaxed_invariant
+from mammoreg.fem.skin.invariants import full_invariant, relaxed_invariant
 from mammoreg.materials.isochoric import IsochoricLaw
 
 SKIN_THICKNESS_MM = 1.5
 """Breast skin by dedicated breast CT: 1.44 +- 0.25 mm, range 0.87 to 2.34 mm (doi 10.1118/1.4793257), rounded."""
 COMPRESSION_SHARE = 0.01
 """Share of the unrelaxed energy: a wrinkled membrane resists compression with a hundredth of its stiffness."""
-
-Integers = NDArray[np.int64]
 
 
 class Membrane:
@@ -37,7 +36,7 @@ class Membrane:
 
     def __init__(
         self,
-        points: Array,
+        points: Floats,
         quads: NDArray[np.integer],
         law: IsochoricLaw,
         thickness_mm: float = SKIN_THICKNESS_MM,
@@ -53,7 +52,7 @@ class Membrane:
         """Degrees of freedom (F, 12)."""
         return self._dofs
 
-    def terms(self, positions: Array) -> tuple[Array, Array]:
+    def terms(self, positions: Floats) -> tuple[Floats, Floats]:
         """Residual (F, 12) in mN and symmetric stiffness (F, 12, 12) in mN/mm at nodes (N, 3)."""
         tangents = self._tangents(positions)
         stress, moduli = self._response(_stretch(tangents))
@@ -69,7 +68,7 @@ class Membrane:
             blocks[:, :, axis, :, axis] += geometric
         return force, stiffness
 
-    def energy_mj(self, positions: Array) -> float:
+    def energy_mj(self, positions: Floats) -> float:
         """Strain energy in mJ at nodes (N, 3)."""
         stretch = _stretch(self._tangents(positions))
         fraction = self.compression_share
@@ -78,15 +77,15 @@ class Membrane:
             density = density + fraction * self.law.energy_kpa(full_invariant(stretch).value)
         return float((density * self.area).sum()) * self.thickness_mm * 1e-3
 
-    def renewed(self, _positions: Array) -> "Membrane":
+    def renewed(self, _positions: Floats) -> "Membrane":
         """Itself: it remembers nothing."""
         return self
 
-    def _tangents(self, positions: Array) -> Array:
+    def _tangents(self, positions: Floats) -> Floats:
         """In-plane deformation gradients (F, 4, 3, 2)."""
         return np.asarray(positions[self.quads].transpose(0, 2, 1)[:, None] @ self.gradients)
 
-    def _response(self, stretch: Array) -> tuple[Array, Array]:
+    def _response(self, stretch: Floats) -> tuple[Floats, Floats]:
         """Second Piola-Kirchhoff stress (F, 4, 3), kPa, and its derivative by the Green strain (F, 4, 3, 3)."""
         fraction = self.compression_share
         stress, moduli = np.zeros(stretch.shape), np.zeros((*stretch.shape, 3))
@@ -104,7 +103,7 @@ class Membrane:
         return stress, moduli
 
 
-def _reference(corners: Array) -> tuple[Array, Array]:
+def _reference(corners: Floats) -> tuple[Floats, Floats]:
     """Gradients (F, 4, 4, 2) of the shape functions in each tangent plane, 1/mm, and areas (F, 4) at 2 x 2 points."""
     sign = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     place = sign / np.sqrt(3.0)
@@ -124,18 +123,18 @@ def _reference(corners: Array) -> tuple[Array, Array]:
     return np.asarray(slopes @ np.linalg.inv(jacobian)), area
 
 
-def _stretch(tangents: Array) -> Array:
+def _stretch(tangents: Floats) -> Floats:
     """In-plane right Cauchy-Green tensor (..., 3): C11, C22, C12."""
     one, two = tangents[..., 0], tangents[..., 1]
     return np.stack([(one * one).sum(axis=-1), (two * two).sum(axis=-1), (one * two).sum(axis=-1)], axis=-1)
 
 
-def _tensor(stress: Array) -> Array:
+def _tensor(stress: Floats) -> Floats:
     """(..., 3) to (..., 2, 2)."""
     return np.asarray(stress[..., [[0, 2], [2, 1]]])
 
 
-def _strain_matrix(tangents: Array, gradients: Array) -> Array:
+def _strain_matrix(tangents: Floats, gradients: Floats) -> Floats:
     """Derivative of the Green strain (F, 4, 3, 12) by the corners' displacements."""
     one, two = tangents[..., None, :, 0], tangents[..., None, :, 1]
     along, across = gradients[..., 0, None], gradients[..., 1, None]

@@ -19,12 +19,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.fem.elements.model import HyperelasticModel
 from mammoreg.fem.parts.part import Part
 from mammoreg.fem.skin.interface import skin_interface
 from mammoreg.fem.skin.law import TensionLinear
 from mammoreg.fem.skin.membrane import SKIN_THICKNESS_MM, Membrane
-from mammoreg.fem.skin.surface import Array, Integers
 from mammoreg.materials.isochoric import IsochoricLaw
 
 SkinName = Literal["none", "attached", "sliding", "adherent"]
@@ -45,7 +45,7 @@ class SkinModel:
     """
 
     parts: tuple[Part, ...]
-    extra_nodes: Array | None
+    extra_nodes: Floats | None
     contact_quads: Integers
     shear_passes: bool = True
 

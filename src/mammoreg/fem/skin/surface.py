@@ -10,10 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mammoreg.arrays import Floats, Integers
 from mammoreg.geometry.quads import node_area_vectors
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 NEWTON_STEPS = 8
@@ -32,8 +30,8 @@ class NearestPoints:
     """
 
     face: Integers
-    shape: Array
-    normal: Array
+    shape: Floats
+    normal: Floats
 
 
 class QuadSurface:
@@ -48,28 +46,28 @@ class QuadSurface:
         self.quads: Integers = np.asarray(quads, dtype=np.int64)
         self.around = _faces_around(self.quads)
 
-    def faces_of(self, nodes: Integers) -> tuple[Integers, Array]:
+    def faces_of(self, nodes: Integers) -> tuple[Integers, Floats]:
         """A face (M,) that holds each node (M,), and the corners' weights (M, 4) there, 1 at the node."""
         flat = self.quads.ravel()
         order = np.argsort(flat, kind="stable")
         place = order[np.searchsorted(flat[order], nodes)]
         return place // 4, np.eye(4)[place % 4]
 
-    def areas(self, positions: Array) -> Array:
+    def areas(self, positions: Floats) -> Floats:
         """Area vectors (N, 3), mm2, that nodes share of the faces around them."""
         return node_area_vectors(positions, self.quads)
 
-    def normals(self, positions: Array) -> Array:
+    def normals(self, positions: Floats) -> Floats:
         """Unit normals (N, 3) at the surface's nodes, zero elsewhere."""
         areas = self.areas(positions)
         size = np.linalg.norm(areas, axis=1, keepdims=True)
         return np.asarray(areas / np.where(size > 0.0, size, 1.0))
 
-    def normal_at(self, positions: Array, face: Integers, shape: Array) -> Array:
+    def normal_at(self, positions: Floats, face: Integers, shape: Floats) -> Floats:
         """Unit normals (M, 3) at places on faces."""
         return _unit(np.einsum("ma,mai->mi", shape, self.normals(positions)[self.quads[face]]))
 
-    def project(self, points: Array, positions: Array, last: Integers) -> NearestPoints:
+    def project(self, points: Floats, positions: Floats, last: Integers) -> NearestPoints:
         """Feet of points (M, 3) on the surface with nodes at positions (N, 3), sought around the faces `last` (M,)."""
         normals, face = self.normals(positions), last
         for _ in range(WALKS):
@@ -89,7 +87,7 @@ class QuadSurface:
         return NearestPoints(found, shape, self.normal_at(positions, found, shape))
 
 
-def _feet(points: Array, corners: Array, normals: Array) -> tuple[Array, Array]:
+def _feet(points: Floats, corners: Floats, normals: Floats) -> tuple[Floats, Floats]:
     """Local coordinates (M, R, 2) and heights (M, R), mm, at which point = foot + height * normal(foot)."""
     local = np.zeros((*corners.shape[:2], 2))
     height = np.zeros(corners.shape[:2])
@@ -109,23 +107,23 @@ def _feet(points: Array, corners: Array, normals: Array) -> tuple[Array, Array]:
     return local, height * np.linalg.norm(_weighted(_shape_functions(local), normals), axis=-1)
 
 
-def _weighted(shape: Array, values: Array) -> Array:
+def _weighted(shape: Floats, values: Floats) -> Floats:
     return np.asarray(np.einsum("mra,mrai->mri", shape, values))
 
 
-def _shape_functions(local: Array) -> Array:
+def _shape_functions(local: Floats) -> Floats:
     """Bilinear shape functions (..., 4)."""
     return np.asarray(0.25 * (1.0 + local[..., 0, None] * CORNERS[:, 0]) * (1.0 + local[..., 1, None] * CORNERS[:, 1]))
 
 
-def _slopes(local: Array) -> Array:
+def _slopes(local: Floats) -> Floats:
     """Their derivatives (..., 4, 2)."""
     along = 0.25 * CORNERS[:, 0] * (1.0 + local[..., 1, None] * CORNERS[:, 1])
     across = 0.25 * CORNERS[:, 1] * (1.0 + local[..., 0, None] * CORNERS[:, 0])
     return np.stack([along, across], axis=-1)
 
 
-def _unit(vectors: Array) -> Array:
+def _unit(vectors: Floats) -> Floats:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.errors import DataError
 from mammoreg.fem.parts.point_ties import point_ties
 from mammoreg.fem.plates.closing import Closed
 from mammoreg.geometry import breast_to_plate, lps_to_breast
-from mammoreg.geometry.frames import Points
 from mammoreg.geometry.quads import area_vectors
 from mammoreg.shape.surface_points import nearest_on_skin
 from stages.annotations import mr_landmarks

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from mammoreg.arrays import Points
 from mammoreg.geometry import lps_to_breast
-from mammoreg.geometry.frames import Laterality, Points
+from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.deformation import MeshDeformation, MethodView
 from mammoreg.localization.to_compressed import SecondVolume
 from stages.annotations import mr_landmarks

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from mammoreg.arrays import Points
 from mammoreg.errors import DataError, NotConvergedError
-from mammoreg.geometry.frames import Points
 from mammoreg.materials.tissue import MATERIALS
 from stages.compress.record import CompressRecord, SolutionRecord
 from stages.engine.artefact import Artefact, Fields
