@@ -15,7 +15,7 @@ from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subjec
 from stages.localize.record import compressed_fields, mammogram_fields, mr_fields
 from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed
 from stages.localize.to_mammogram import missing_in_mammograms, predict_in_mammograms
-from stages.localize.to_mr import Anatomy, missing_in_mr, predict_in_mr
+from stages.localize.to_mr import UndeformedBreast, missing_in_mr, predict_in_mr
 from stages.localize.views import CaseViews, case_views, lost_views
 from stages.mesh.record import MeshRecord
 from stages.second_volume import second_volume
@@ -56,7 +56,7 @@ def _to_mammograms(inputs: Inputs, views: CaseViews, laterality: Laterality) -> 
 
 def _to_mr(inputs: Inputs, views: CaseViews, segment: SegmentRecord, skin: Points) -> Fields:
     """Reads the views' `lesion` alone."""
-    anatomy = Anatomy(segment.laterality, segment.breast_mask, segment.nipple, skin, segment.chest_wall)
+    anatomy = UndeformedBreast(segment.laterality, segment.breast_mask, segment.nipple, skin, segment.chest_wall)
     names_of = {view: view_lesion_names(inputs, view) for view in views.imaged}
     return predict_in_mr(views, anatomy, names_of, {v: view_areas(inputs, pose) for v, pose in views.poses.items()})
 

@@ -19,7 +19,7 @@ from stages.methods import METHODS
 
 
 @dataclass(frozen=True)
-class Anatomy:
+class UndeformedBreast:
     """The undeformed breast in the breast frame.
 
     Attributes:
@@ -36,7 +36,10 @@ class Anatomy:
 
 
 def predict_in_mr(
-    views: CaseViews, anatomy: Anatomy, names_of: Mapping[str, list[str]], areas: Mapping[str, Mapping[str, LesionArea]]
+    views: CaseViews,
+    anatomy: UndeformedBreast,
+    names_of: Mapping[str, list[str]],
+    areas: Mapping[str, Mapping[str, LesionArea]],
 ) -> Fields:
     """Rows `mr_rows` (LPS), and per lesion and method the region and the curves.
 
@@ -73,7 +76,7 @@ def missing_in_mr(names_of: Mapping[str, list[str]], message: str) -> list[MrRow
     return [MrRow(shown[name], method, name, message=message) for method in METHODS for name in names]
 
 
-def _row(method: str, name: str, found: MrPrediction, anatomy: Anatomy, lost: list[str]) -> MrRow:
+def _row(method: str, name: str, found: MrPrediction, anatomy: UndeformedBreast, lost: list[str]) -> MrRow:
     point = found.point
     x, y, z = breast_to_lps(point, anatomy.laterality).tolist()
     return MrRow(
