@@ -141,7 +141,7 @@ def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, segm
 def test_tissue_map_is_made_where_a_material_asks_for_it(inputs, segment, plain, tmp_path, monkeypatch):
     told = inputs | {"segment": segment}
     with monkeypatch.context() as patch:
-        patch.setattr(gland_map, "tissue_fraction", lambda *_: pytest.fail("made for homogeneous tissue"))
+        patch.setattr(gland_map, "gland_fraction", lambda *_: pytest.fail("made for homogeneous tissue"))
         alike = run("compress", tmp_path, told)
     np.testing.assert_array_equal(_nodes(alike), _nodes(plain))
     assert "gland_fraction" not in alike.names()

@@ -10,33 +10,11 @@ import nibabel
 import numpy as np
 from PIL import Image
 
-from stages.engine.registry import STAGE_MODULES
+from stages.engine.registry import CASE_STAGES, COHORT_STAGES, STAGE_MODULES, VIEW_STAGES, load_stage
 
 PROJECT = Path(__file__).resolve().parents[2]
-INPUTS = {
-    "segment": (("mr",), ("mr_labels", "mr_compressed")),
-    "mesh": (("segment",), ()),
-    "calibrate": ((), ()),
-    "pose": (("segment", "mesh"), ("image",)),
-    "compress": (("mesh", "segment", "pose", "calibrate"), ()),
-    "shape": (("compress", "pose", "mesh", "segment"), ()),
-    "solve": (("mesh", "compress", "shape", "calibrate"), ()),
-    "project": (("segment", "mesh", "pose", "compress", "solve"), ()),
-    "localize": (
-        ("segment", "mesh"),
-        ("pose", "compress", "solve", "mr_lesion", "mr_landmarks", "lesion_CC", "lesion_MLO"),
-    ),
-    "evaluate": (("localize",), ("mr_compressed_landmarks", "landmarks_CC", "landmarks_MLO")),
-    "figures": (("segment", "mesh"), ("pose", "project", "localize", "evaluate")),
-    "tables": (("cases",), ("views", "localize", "evaluate", "calibrate")),
-    "report": (("cases", "tables"), ("views", "figures", "evaluate")),
-    "runtime": (("segment", "mesh"), ("pose",)),
-    "error_vs_runtime": (("runtime",), ()),
-    "volunteer": (("segment", "mesh", "pose"), ("calibrate", "compress", "solve", "mr_landmarks")),
-    "paper_tables": ((), ("volunteer",)),
-    "digital": ((), ()),
-}
-TAKES_FAILED = ("evaluate", "figures", "tables", "report", "error_vs_runtime", "volunteer", "paper_tables")
+STUDIES = ("runtime", "error_vs_runtime", "volunteer", "paper_tables")
+TOYS = ("digital", *CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES, *STUDIES)
 
 TOY_STAGE = '''
 PAPER_TABLES = ("table_2_materials", "table_3_boundary", "table_4_skin", "findings_tables_2_to_4")
@@ -81,17 +59,17 @@ def make_project(folder: Path, real: tuple[str, ...] = ()) -> Path:
         (shutil.copytree if source.is_dir() else shutil.copy)(source, folder / name)
     ignored = shutil.ignore_patterns("__pycache__")
     shutil.copytree(PROJECT / "src", folder / "src", ignore=ignored)
-    for name, (required, optional) in INPUTS.items():
-        if name in real:
-            continue
+    for name in (name for name in TOYS if name not in real):
+        # What it takes and what becomes of failures is the real stage's, so that the rules are tested with it.
+        stage = load_stage(name)
         module = folder.joinpath("src", *STAGE_MODULES[name].split(".")).with_suffix(".py")
         module.write_text(
             TOY_STAGE.format(
                 name=name,
-                required=required,
-                optional=optional,
-                takes_failed=name in TAKES_FAILED,
-                folder="." if name in ("report", "error_vs_runtime", "paper_tables") else None,
+                required=stage.inputs,
+                optional=stage.optional,
+                takes_failed=stage.takes_failed,
+                folder=stage.folder,
             )
         )
     (folder / "config/config.yaml").write_text("results: results\n")

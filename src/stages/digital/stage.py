@@ -7,6 +7,7 @@ from pydantic import Field
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, breast_to_plate
+from mammoreg.imaging.mammogram_orientation import View as Mammogram
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.mammogram import Exposure, Pectoral, presented, project
 from mammoreg.phantom.mri import T1, T1_FAT_SUPPRESSED, Acquisition, acquire
@@ -16,6 +17,7 @@ from mammoreg.phantom.skin_points import skin_points
 from mammoreg.phantom.warp import Deformed
 from stages.digital.dicom import mammogram_dicom, mask_png, mr_dicom, nifti, points_tsv
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.views import IMAGED, SECOND_VOLUME
 
 MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1300, 900
 SOURCE_DETECTOR_MM, SUPPORT_DETECTOR_MM = 650.0, 15.0
@@ -39,7 +41,7 @@ class DigitalPatient(SettingsModel):
         "nifti", description="Form of the MR volume: NIfTI, NIfTI of sagittal planes, or a folder with a DICOM series."
     )
     monochrome1: bool = Field(False, description="Whether the mammograms are stored inverted (MONOCHROME1).")
-    unseen_views: tuple[Literal["CC", "MLO"], ...] = Field((), description="Views without a visible lesion.")
+    unseen_views: tuple[Mammogram, ...] = Field((), description="Views without a visible lesion.")
 
 
 class Settings(SettingsModel):
@@ -65,8 +67,10 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         raise DataError(f"digital.patients has no {subject.case!r}; it has {', '.join(settings.patients)}")
     chosen = settings.patients[subject.case]
     if chosen.kind == "volunteer":
-        return Making(subject, chosen, Patient.draw(chosen.seed, ("3D",), True, VOLUNTEER_LANDMARKS)).volunteer()
-    return Making(subject, chosen, Patient.draw(chosen.seed, ("CC", "MLO"), False, LANDMARKS)).clinical()
+        return Making(
+            subject, chosen, Patient.draw(chosen.seed, (SECOND_VOLUME,), True, VOLUNTEER_LANDMARKS)
+        ).volunteer()
+    return Making(subject, chosen, Patient.draw(chosen.seed, IMAGED, False, LANDMARKS)).clinical()
 
 
 def mr_files(volume: Volume, chosen: DigitalPatient, subject: Subject) -> dict[str, bytes]:
@@ -108,8 +112,8 @@ class Making:
     def volunteer(self) -> Fields:
         """MR before and between the plates, with landmarks and points of the skin in both."""
         self._undeformed_mr()
-        pressed, deformed = self.patient.pressed("3D")
-        self._note_press("3D", pressed, deformed, None)
+        pressed, deformed = self.patient.pressed(SECOND_VOLUME)
+        self._note_press(SECOND_VOLUME, pressed, deformed, None)
         grid = self.patient.mr_grid(MR_MM, False)
         origins = deformed.tabulated(grid.origin - MR_MM, grid.to_world(np.array(grid.shape)))
         data = acquire(grid, origins.at, self.acquisition, self.patient.stream(2))

@@ -19,6 +19,7 @@ __all__ = [
     "Fields",
     "Inputs",
     "Laterality",
+    "NoSettings",
     "SettingsModel",
     "Stage",
     "Subject",
@@ -36,6 +37,10 @@ class SettingsModel(BaseModel):
     def plain(self) -> dict[str, Any]:
         """The settings in JSON types, as artefacts keep them."""
         return dict(json.loads(self.model_dump_json()))
+
+
+class NoSettings(SettingsModel):
+    """Settings of a stage that has none."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from stages.engine.artefact import Fields, first_failure
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Inputs, NoSettings, Stage, Subject
 from stages.figures.record import Picture, figures_fields
 from stages.views import IMAGED
 
@@ -13,11 +13,7 @@ if TYPE_CHECKING:
 _ARTEFACTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate")
 
 
-class Settings(SettingsModel):
-    """`figures` has no settings."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Draw and export what the case's stages came to; what failed first is passed on."""
     # Only this function pays for matplotlib.
     from stages.figures.case import PicturedCase
@@ -56,7 +52,7 @@ STAGE = Stage(
         "mr_compressed_landmarks",
         *(f"{kind}_{view}" for kind in ("lesion", "landmarks") for view in IMAGED),
     ),
-    settings=Settings,
+    settings=NoSettings,
     run=run,
     takes_failed=True,
     folder=".",

@@ -11,7 +11,7 @@ from mammoreg.geometry.frames import Laterality
 from mammoreg.meshing.block import BlockMesh
 from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_lesion_names
 from stages.engine.artefact import Artefact, Fields, first_failure
-from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
+from stages.engine.contract import Failure, Inputs, NoSettings, Stage, Subject, Value
 from stages.localize.record import compressed_fields, mammogram_fields, mr_fields
 from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed
 from stages.localize.to_mammogram import missing_in_mammograms, predict_in_mammograms
@@ -25,11 +25,7 @@ from stages.views import IMAGED
 _SKIN_PARTS = 6
 
 
-class Settings(SettingsModel):
-    """`localize` has no settings: what it predicts is bound by the contract."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Predict in every direction for which the case has marks; what a failed view lacks is a row with its message."""
     required = [inputs.artefact(name) for name in ("segment", "mesh")]
     if failure := first_failure(required):
@@ -117,7 +113,7 @@ STAGE = Stage(
         "mr_landmarks",
         *(f"lesion_{view}" for view in IMAGED),
     ),
-    settings=Settings,
+    settings=NoSettings,
     run=run,
     takes_failed=True,
     without_result=without_result,

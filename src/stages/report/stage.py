@@ -4,7 +4,7 @@ from pathlib import Path
 
 from stages.cohort.cases import read_cohort
 from stages.engine.artefact import Artefact, Fields
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Inputs, NoSettings, Stage, Subject
 from stages.engine.registry import CASE_STAGES, VIEW_STAGES
 from stages.report.case import case_page
 from stages.report.cohort import cards, errors_picture, excluded_rows, findings_section, statistics_sections
@@ -15,11 +15,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 _ORDER = ("segment", "mesh", *VIEW_STAGES, "localize", "evaluate", "figures")
 
 
-class Settings(SettingsModel):
-    """`report` has no settings."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Write the page from all artefacts, those of failed cases too."""
     artefacts = [artefact for name in _ORDER for artefact in inputs.artefacts(name)]
     cohort = read_cohort(inputs.files["cases"], inputs.path("views"))
@@ -67,7 +63,7 @@ STAGE = Stage(
     schema=1,
     inputs=("cases", "tables"),
     optional=("views", "calibrate", *CASE_STAGES, *VIEW_STAGES),
-    settings=Settings,
+    settings=NoSettings,
     run=run,
     takes_failed=True,
     folder=".",

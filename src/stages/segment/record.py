@@ -8,12 +8,14 @@ import numpy as np
 from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast
 from mammoreg.geometry.frames import Laterality
+from mammoreg.labels import Label
 from stages.engine.artefact import Array, Fields, Value, VolumeField
 from stages.engine.record import Record
 
+_TISSUES = {label: label.name.lower() for label in Label} | {Label.MUSCLE: "muscle/chest wall"}
 _VOLUMES = {
     "mr": "MR intensity, bias-corrected",
-    "labels": "tissue: 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall",
+    "labels": "tissue: " + ", ".join(f"{label.value} {_TISSUES[label]}" for label in Label),
     "breast_mask": "breast in front of the chest-wall surface",
     "compressed_mask": "body in the compressed volume, chest included",
 }

@@ -1,11 +1,13 @@
 """What stage `tables` leaves: the cohort's tables with their columns, statistics, findings and failures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from typing import Any
 
 from stages.engine.artefact import Fields, Value
 from stages.engine.record import Record
 from stages.formats.table import Table
+from stages.localize.record import MrRow
 
 _OVERLAP = {"overlap_percent": 1, "dice": 3, "size_ratio": 2}
 
@@ -24,18 +26,9 @@ PREDICTIONS_MR = Table(
     "localize",
     "mr_rows",
     ("views", "method", "name"),
-    dict.fromkeys(
-        (
-            *("x", "y", "z", "radius_mm", "beam_gap_mm"),
-            *("nipple_distance_mm", "skin_depth_mm", "chest_wall_depth_mm"),
-        ),
-        2,
-    ),
+    dict.fromkeys((field.name for field in fields(MrRow) if field.type == float | None), 2),
     ("clock", "message"),
-    (
-        *("case", "views", "method", "name", "x", "y", "z", "radius_mm", "beam_gap_mm", "nipple_distance_mm", "clock"),
-        *("skin_depth_mm", "chest_wall_depth_mm", "message"),
-    ),
+    ("case", *(field.name for field in fields(MrRow))),
 )
 PREDICTIONS_COMPRESSED = Table(
     "predictions_compressed",

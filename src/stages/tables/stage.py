@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.completion import first_failures
-from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Failure, Inputs, NoSettings, Stage, Subject
 from stages.formats.findings import FINDINGS
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
@@ -16,11 +16,7 @@ from stages.tables.statistics import Group, groups, incomplete, readable_rows, s
 _INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "localize", "evaluate", "figures")
 
 
-class Settings(SettingsModel):
-    """`tables` has no settings: the contract binds what it writes."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Write every table, with or without truth; cases that failed are named first."""
     artefacts = [artefact for name in _INPUTS for artefact in inputs.artefacts(name)]
     rows_of = {table.name: table.rows(artefacts) for table in TABLES}
@@ -64,4 +60,4 @@ def _files(table: Table, rows: Sequence[Row], found: Sequence[Group], failures: 
     }
 
 
-STAGE = Stage(name="tables", schema=1, inputs=(), optional=_INPUTS, settings=Settings, run=run, takes_failed=True)
+STAGE = Stage(name="tables", schema=1, inputs=(), optional=_INPUTS, settings=NoSettings, run=run, takes_failed=True)

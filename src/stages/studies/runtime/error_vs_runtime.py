@@ -3,7 +3,7 @@
 from typing import Any
 
 from stages.engine.artefact import Fields
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Inputs, NoSettings, Stage, Subject
 from stages.formats.pages import as_csv, cells
 from stages.formats.table import Table
 
@@ -18,11 +18,7 @@ TABLE = Table(
 )
 
 
-class Settings(SettingsModel):
-    """`error_vs_runtime` has no settings; the meshes are those of `runtime`."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Write `tables/error_vs_runtime.csv`, and the picture where anything has a truth."""
     rows = TABLE.rows(inputs.artefacts("runtime"))
     files = {f"tables/{TABLE.name}.csv": as_csv(TABLE.columns, cells(TABLE, rows))}
@@ -47,7 +43,7 @@ STAGE = Stage(
     name="error_vs_runtime",
     schema=1,
     inputs=("runtime",),
-    settings=Settings,
+    settings=NoSettings,
     run=run,
     takes_failed=True,
     folder=".",

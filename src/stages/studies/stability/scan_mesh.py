@@ -9,15 +9,11 @@ from mammoreg.meshing.breast import build_mesh
 from mammoreg.scenes.scenario import LEVELS
 from stages.bias import n4_field
 from stages.cohort.readers.mr import read_mr
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Fields, Inputs, NoSettings, Stage, Subject
 from stages.studies.stability.record import scan_mesh_fields
 
 
-class Settings(SettingsModel):
-    """`stability_scan_mesh` has no settings: segmentation and mesher work as for a case."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Segment the right breast, or the left one where the scan shows no right one, and mesh it at every size."""
     side, found = _segmented(inputs)
     mask = found.mr.with_data(found.breast.astype(np.uint8))
@@ -38,4 +34,4 @@ def _segmented(inputs: Inputs) -> tuple[Laterality, Segmentation]:
     raise DataError(f"key stability_scan: {faults[0]}")
 
 
-STAGE = Stage(name="stability_scan_mesh", schema=1, inputs=("scan",), settings=Settings, run=run)
+STAGE = Stage(name="stability_scan_mesh", schema=1, inputs=("scan",), settings=NoSettings, run=run)

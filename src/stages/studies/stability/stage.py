@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Fields, Inputs, NoSettings, Stage, Subject
 from stages.formats.pages import as_csv, as_html, as_markdown, cells
 from stages.formats.table import Table
 from stages.studies.stability.summary import Row, summary, with_mesh_trend
@@ -26,11 +26,7 @@ _PICTURE = (
 )
 
 
-class Settings(SettingsModel):
-    """`stability` has no settings; those of the runs are in `stability_batch`."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Write `tables/stability.csv`, a page that says what it shows, and the picture."""
     rows = with_mesh_trend(_rows(inputs))
     first, sections = summary(rows)
@@ -66,7 +62,7 @@ STAGE = Stage(
     name="stability",
     schema=1,
     inputs=("stability_batch",),
-    settings=Settings,
+    settings=NoSettings,
     run=run,
     takes_failed=True,
     folder=".",

@@ -6,7 +6,7 @@ from typing import Any
 from mammoreg.metrics.findings import Finding, judged, numbers_of
 from mammoreg.metrics.summary import Summary, summarise
 from stages.engine.artefact import Artefact, Fields
-from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Inputs, NoSettings, Stage, Subject
 from stages.formats.findings import FINDINGS, findings_rows
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
@@ -63,11 +63,7 @@ _SMOOTH = f"{_PLAIN}, between smooth plates, for a sliding skin lets no friction
 _SETTING = {"table_2": ("plain", _PLAIN), "table_3": ("own", _OWN), "table_4": ("smooth", _SMOOTH)}
 
 
-class Settings(SettingsModel):
-    """`paper_tables` has no settings; what is varied stands in `volunteer`."""
-
-
-def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
+def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Write each table as CSV, and a page beside the paper's numbers."""
     volunteers = inputs.artefacts(STUDY)
     files: dict[str, bytes] = {}
@@ -200,7 +196,7 @@ STAGE = Stage(
     schema=1,
     inputs=(),
     optional=(STUDY,),
-    settings=Settings,
+    settings=NoSettings,
     run=run,
     takes_failed=True,
     folder=".",
