@@ -43,7 +43,7 @@ def run(inputs, settings, subject):
         "error_vs_runtime": {{"tables/error_vs_runtime.csv": b"table"}},
         "paper_tables": {{f"tables/{{n}}.csv": b"table" for n in PAPER_TABLES}},
     }}.get({name!r}, {{}})
-    values = {{"level": settings.level}}
+    values = {{"level": settings.level, "n": 3}}
     arrays = {{"level": Array(np.full(3, settings.level), "1", "level")}}
     return Fields(arrays=arrays, values=values, files=files, failure=failure)
 
