@@ -22,17 +22,21 @@ FLIPS = (True, False)
 
 
 def write_pictured_case(
-    folder: Path, laterality: Laterality = "R", views: tuple[str, ...] = ("CC", "MLO")
+    folder: Path, laterality: Laterality = "R", views: tuple[str, ...] = ("CC", "MLO"), outlined: bool = True
 ) -> dict[str, Any]:
-    """Inputs of stage `figures` by name; the predictions are exact, since truth and model are the same affine map."""
-    inputs: dict[str, Any] = synthetic.write_case(folder, laterality, views, FLIPS, compressed="3D" in views)
+    """Inputs of stage `figures` by name; the predictions are exact, since truth and model are the same affine map.
+
+    A view 3D without an outline is a case that has its share of compression alone.
+    """
+    compressed = "3D" in views and outlined
+    inputs: dict[str, Any] = synthetic.write_case(folder, laterality, views, FLIPS, compressed, outlined)
     _add_volumes(inputs["segment"][0])
     inputs["mr"] = _write_mr(folder / "mr.nii.gz")
     imaged = [pose for pose in inputs["pose"] if "3D" not in pose.name]
     for pose in imaged:
         _add_images(pose)
     inputs["project"] = [_run("project", folder, inputs, laterality, view) for view in views]
-    inputs |= _write_marks(folder, laterality, [v for v in views if v != "3D"])
+    inputs |= _write_marks(folder, laterality, [v for v in views if v != "3D"], compressed)
     for stage in ("localize", "evaluate"):
         inputs[stage] = [_run(stage, folder, inputs, laterality, None)]
     return inputs
@@ -95,7 +99,7 @@ def _add_images(path: Path) -> None:
     _rewrite(path, arrays, {})
 
 
-def _write_marks(folder: Path, laterality: Laterality, views: list[str]) -> dict[str, Path]:
+def _write_marks(folder: Path, laterality: Laterality, views: list[str], compressed: bool) -> dict[str, Path]:
     marks = {name: breast_to_lps(point, laterality) for name, point in LANDMARKS.items()}
     lesion = breast_to_lps(LESION, laterality)
     files = {
@@ -113,7 +117,7 @@ def _write_marks(folder: Path, laterality: Laterality, views: list[str]) -> dict
         Image.fromarray((np.hypot(rows - row, columns - column) < 18).astype(np.uint8) * 255).save(
             files[f"lesion_{view}"]
         )
-    if not views:
+    if not views and compressed:
         files["mr_compressed_landmarks"] = files["mr_landmarks"]
     return files
 

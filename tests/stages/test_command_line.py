@@ -5,8 +5,9 @@ from dataclasses import replace
 import nibabel
 import numpy as np
 import pytest
+from PIL import Image
 
-from mammoreg.geometry import Volume
+from mammoreg.geometry import Volume, breast_to_lps, breast_to_plate, plate_to_breast
 from mammoreg.meshing.block import BlockMesh
 from stages.__main__ import main
 from stages.engine.artefact import Array, Fields, VolumeField, write_artefact
@@ -70,12 +71,91 @@ def test_export_writes_what_other_programs_open(artefact, tmp_path, capsys):
     mesh = meshio.read(tmp_path / "out" / "points.vtu")
     assert mesh.cells[0].data.shape == (8, 8)
     np.testing.assert_allclose(mesh.cell_data["gland_fraction"][0], np.linspace(0, 1, 8))
-    image = nibabel.load(tmp_path / "out" / "mr.nii")
+    image = nibabel.load(tmp_path / "out" / "mr.nii.gz")
     # NIfTI's world is RAS: x and y of LPS change their sign.
     np.testing.assert_allclose(image.affine @ [1, 2, 3, 1], [-2.0, -6.0, 4.5, 1.0])
     assert image.get_fdata()[1, 2, 3] == 23
     assert (tmp_path / "out" / "rows.csv").read_text() == "name,x_mm\nP1,1.5\nP2,\n"
-    assert (tmp_path / "out" / "updated.mr.nii").exists()
+    captured = capsys.readouterr()
+    assert "not written: updated/mr: its artefact does not hold the angle of its plates" in captured.err
+    assert not (tmp_path / "out" / "updated.mr.nii.gz").exists()
+    assert "points.vtu: node positions (mm)" in (tmp_path / "out" / "README.txt").read_text()
+
+
+def pressed_artefact(path, laterality, view="CC"):
+    """A block, two of its nodes, a volume and images, all turned into the plate frame at 40 degrees."""
+    grid = np.stack(np.meshgrid(*[np.arange(3.0)] * 3, indexing="ij"), axis=-1).transpose(2, 1, 0, 3).reshape(-1, 3)
+    block = 10 * grid + [5.0, -60.0, 20.0]
+    plates = breast_to_plate(block, 40.0)
+    data = np.zeros((4, 5, 6), dtype=np.float32)
+    data[3, 1, 2] = 7.0
+    volume = Volume(data, np.array([1.0, -50.0, 3.0]), np.array([1.0, 2.0, 0.5]), "plate")
+    fields = Fields(
+        arrays={
+            "deformed": Array(plates, "mm", "nodes, plate frame", "plate"),
+            "surface": Array(plates[:2], "mm", "places, plate frame", "plate"),
+            "projection": Array(np.linspace(0.0, 2.5, 120).reshape(10, 12), "1", "attenuation"),
+            "mask": Array(np.eye(12, dtype=np.uint8)[:10], "1", "silhouette"),
+            "contact/anchor": Array(np.zeros((2, 3, 4, 3)), "mm", "contact points"),
+        },
+        volumes={"updated/mr": VolumeField(volume, "1", "MR volume")},
+        values={"angle_deg": 40.0},
+    )
+    write_artefact(path, ATTRS | {"stage": "solve", "laterality": laterality, "view": view}, fields)
+    return breast_to_lps(block, laterality), volume
+
+
+@pytest.mark.parametrize("laterality", ["R", "L"])
+def test_what_the_plates_frame_holds_is_exported_in_patient_coordinates(tmp_path, laterality):
+    import meshio
+
+    nodes, volume = pressed_artefact(tmp_path / "solve.h5", laterality)
+    out = tmp_path / "out"
+    assert main(["export", str(tmp_path / "solve.h5"), "--to", str(out)]) == 0
+    mesh = meshio.read(out / "deformed.vtu")
+    np.testing.assert_allclose(mesh.points, nodes, atol=1e-9)
+    corners = mesh.points[mesh.cells_dict["hexahedron"]]
+    edges = [corners[:, i] - corners[:, 0] for i in (1, 3, 4)]
+    np.testing.assert_allclose(np.einsum("ij,ij->i", np.cross(edges[0], edges[1]), edges[2]), 1000.0)
+    assert "LPS_mm" in mesh.field_data
+    header, *lines = (out / "surface.csv").read_text().splitlines()
+    assert header == '"x (surface, mm)","y (surface, mm)","z (surface, mm)"'
+    np.testing.assert_allclose([[float(x) for x in line.split(",")] for line in lines], nodes[:2], atol=1e-9)
+    image = nibabel.load(out / "updated.mr.nii.gz")
+    (bright,) = np.argwhere(image.get_fdata() == 7.0)
+    place = nibabel.affines.apply_affine(image.affine, bright) * [-1, -1, 1]
+    expected = breast_to_lps(plate_to_breast(volume.to_world(np.array([3, 1, 2])), 40.0), laterality)
+    np.testing.assert_allclose(place, expected, atol=1e-4)
+    readme = (out / "README.txt").read_text()
+    assert "The breast lies where the pose has its plates" in readme
+    assert "deformed.vtu: nodes, LPS (mm)" in readme
+
+
+def test_images_are_exported_as_pictures_and_the_rest_is_named(tmp_path, capsys):
+    pressed_artefact(tmp_path / "solve.h5", "R")
+    assert main(["export", str(tmp_path / "solve.h5"), "--to", str(tmp_path / "out")]) == 0
+    with Image.open(tmp_path / "out" / "projection.tiff") as picture:
+        np.testing.assert_allclose(np.asarray(picture), np.linspace(0.0, 2.5, 120).reshape(10, 12), atol=1e-6)
+    with Image.open(tmp_path / "out" / "mask.png") as picture:
+        np.testing.assert_array_equal(np.asarray(picture), 255 * np.eye(12)[:10])
+    assert not list((tmp_path / "out").glob("*projection*.csv"))
+    assert "not written: contact/anchor: an array of 4 dimensions" in capsys.readouterr().err
+
+
+def test_what_a_second_volume_places_is_refused_with_the_reason(tmp_path, capsys):
+    pressed_artefact(tmp_path / "solve.h5", "R", view="3D")
+    assert main(["export", str(tmp_path / "solve.h5"), "--to", str(tmp_path / "out")]) == 0
+    error = capsys.readouterr().err
+    for name in ("deformed", "surface", "updated/mr"):
+        assert f"not written: {name}: a second MR volume's outline places it" in error
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["README.txt", "mask.png", "projection.tiff"]
+
+
+def test_an_artefact_with_nothing_to_export_says_so(tmp_path, capsys):
+    write_artefact(tmp_path / "report.h5", ATTRS | {"stage": "report"}, Fields(values={"cases": 7}))
+    assert main(["export", str(tmp_path / "report.h5"), "--to", str(tmp_path / "out")]) == 1
+    assert "report.h5 holds nothing that can be exported" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_check_recognises_swapped_tables(tmp_path, capsys):

@@ -20,7 +20,7 @@ from mammoreg.phantom.patient import ROLL_DEG, Patient
 from mammoreg.phantom.warp import Deformed
 from stages.cohort.readers.mr import read_mr
 from stages.digital import stage as digital
-from stages.digital.dicom import mammogram_dicom, mask_png, nifti, points_tsv
+from stages.digital.dicom import mammogram_dicom, nifti, points_tsv, stored_mask
 from stages.digital.stage import Settings
 from stages.engine.contract import Inputs, Subject
 
@@ -141,7 +141,7 @@ def test_a_mammogram_is_stored_as_its_orientation_says(laterality, view, orienta
     assert (dataset.BodyPartThickness, dataset.CompressionForce) == (59, 81.2)
     assert "StudyDate" in dataset
     assert not dataset.StudyDate
-    mask = np.array(Image.open(io.BytesIO(mask_png(image > 0, laterality))))
+    mask = np.array(Image.open(io.BytesIO(stored_mask(image > 0, laterality))))
     assert (mask[:, first] == 255).all()
 
 

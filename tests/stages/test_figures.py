@@ -12,7 +12,10 @@ from PIL import Image
 
 from mammoreg.geometry import breast_to_lps, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
+from stages.cohort.readers.points import read_points
 from stages.engine.artefact import Artefact
+from stages.figures.exports import file_names
+from stages.formats.vtu import FRAME_FIELD
 from stages.pose.record import PoseRecord
 from tests.stages import synthetic_case as synthetic
 from tests.stages.pictured_case import (
@@ -42,10 +45,14 @@ def read_picture(path: Path) -> np.ndarray:
         return np.asarray(picture)
 
 
-def between_plates(points: np.ndarray, laterality: Laterality) -> np.ndarray:
-    """The synthetic truth: LPS points of the undeformed breast, carried between the plates of the CC, LPS."""
-    placed = synthetic.compression("CC").forward(lps_to_breast(points, laterality))
-    return breast_to_lps(plate_to_breast(placed, synthetic.geometry("CC").angle_deg), laterality)
+def between_plates(points: np.ndarray, laterality: Laterality, view: str = "CC") -> np.ndarray:
+    """The synthetic truth: LPS points of the undeformed breast, carried between the plates of a view, LPS."""
+    placed = synthetic.compression(view).forward(lps_to_breast(points, laterality))
+    return breast_to_lps(plate_to_breast(placed, synthetic.geometry(view).angle_deg), laterality)
+
+
+def mr_landmarks_of(inputs: dict[str, Any]) -> dict[str, np.ndarray]:
+    return read_points(inputs["mr_landmarks"])
 
 
 def test_all_pictures_are_drawn_and_listed(case: Case) -> None:
@@ -58,7 +65,7 @@ def test_all_pictures_are_drawn_and_listed(case: Case) -> None:
 
 def test_the_predicted_lesion_on_the_mr_grid_lies_at_the_lesion(case: Case) -> None:
     folder, _, laterality = case
-    path = folder / "export" / "lesion_0_updated_mr.nii.gz"
+    path = folder / "export" / "lesion_lesion_updated_mr.nii.gz"
     image = nibabel.load(path)
     assert image.shape == MR_SHAPE
     np.testing.assert_allclose(image.affine, MR_AFFINE, atol=1e-4)
@@ -69,7 +76,7 @@ def test_the_predicted_lesion_on_the_mr_grid_lies_at_the_lesion(case: Case) -> N
 
 def test_the_predicted_lesion_on_the_mammogram_covers_the_marked_one(case: Case) -> None:
     folder, _, _ = case
-    predicted = read_picture(folder / "export" / "lesion_0_updated_CC.png") > 0
+    predicted = read_picture(folder / "export" / "lesion_lesion_updated_CC.png") > 0
     marked = read_picture(folder / "CC.png") > 0
     assert predicted.shape == marked.shape
     shift = np.argwhere(predicted).mean(axis=0) - np.argwhere(marked).mean(axis=0)
@@ -84,16 +91,74 @@ def test_stored_and_canonical_masks_are_inverse(case: Case) -> None:
     np.testing.assert_array_equal(pose.stored_image(pose.canonical_image(stored)), stored)
 
 
-def test_itk_reads_the_displacement_in_lps(case: Case) -> None:
+def read_transform(folder: Path, name: str) -> SimpleITK.Transform:
+    return SimpleITK.ReadTransform(str(folder / "export" / f"{name}.h5"))
+
+
+def carried_by(transform: SimpleITK.Transform, points: np.ndarray) -> np.ndarray:
+    return np.array([transform.TransformPoint(point.tolist()) for point in points])
+
+
+def inner_points(laterality: Laterality) -> np.ndarray:
+    """Points all over the breast, up to its skin, LPS."""
+    return breast_to_lps(synthetic.box().subdivide(2).points, laterality)
+
+
+def test_both_transforms_carry_points_of_the_breast_up_to_its_skin_and_back(case: Case) -> None:
     folder, _, laterality = case
-    image = SimpleITK.ReadImage(str(folder / "export" / "displacement_CC_updated.nii.gz"))
-    assert image.GetNumberOfComponentsPerPixel() == 3
-    points = breast_to_lps(np.array([[-10.0, -40.0, 12.0], [20.0, -20.0, -8.0]]), laterality)
-    for point in points:
-        index = image.TransformPhysicalPointToIndex(point.tolist())
-        voxel = np.array(image.TransformIndexToPhysicalPoint(index))
-        moved = between_plates(voxel[None], laterality)[0] - voxel
-        np.testing.assert_allclose(image[index], moved, atol=1e-3)
+    points = inner_points(laterality)
+    forward = carried_by(read_transform(folder, "displacement_CC_updated_forward"), points)
+    np.testing.assert_allclose(forward, between_plates(points, laterality), atol=0.02)
+    back = carried_by(read_transform(folder, "displacement_CC_updated_inverse"), forward)
+    np.testing.assert_allclose(back, points, atol=0.05)
+
+
+@pytest.mark.parametrize("way", ["forward", "inverse"])
+def test_itk_reads_the_same_field_from_nifti_and_from_the_transform(case: Case, way: str) -> None:
+    folder, _, laterality = case
+    name = f"displacement_CC_updated_{way}"
+    field = SimpleITK.ReadImage(str(folder / "export" / f"{name}.nii.gz"))
+    assert field.GetNumberOfComponentsPerPixel() == 3
+    points = inner_points(laterality)[::7]
+    from_nifti = SimpleITK.DisplacementFieldTransform(SimpleITK.Cast(field, SimpleITK.sitkVectorFloat64))
+    np.testing.assert_allclose(
+        carried_by(from_nifti, points), carried_by(read_transform(folder, name), points), atol=1e-3
+    )
+
+
+def test_the_fields_masks_hold_the_breast_before_and_between_the_plates(case: Case) -> None:
+    folder, _, laterality = case
+    block = synthetic.box().subdivide(2)
+    middle = block.points.mean(axis=0)
+    within = middle + 0.96 * (block.points - middle)
+    beyond = middle + 1.06 * (block.points[block.skin_nodes()] - middle)
+    for way in ("forward", "inverse"):
+        path = folder / "export" / f"displacement_CC_updated_{way}_mask.nii.gz"
+        mask = SimpleITK.ReadImage(str(path))
+        for points, held in ((within, 1), (beyond, 0)):
+            places = breast_to_lps(points, laterality)
+            places = places if way == "forward" else between_plates(places, laterality)
+            found = [mask[mask.TransformPhysicalPointToIndex(place.tolist())] for place in places]
+            assert found == [held] * len(found)
+
+
+def test_resampling_with_the_inverse_shows_the_volume_between_the_plates(case: Case) -> None:
+    folder, _, _ = case
+    breast = Artefact(folder / "segment.h5").volume("mr")
+    undeformed = SimpleITK.GetImageFromArray(np.asarray(breast.data, dtype=np.float32).transpose(2, 1, 0))
+    undeformed.SetOrigin(breast.origin.tolist())
+    undeformed.SetSpacing(breast.spacing.tolist())
+    exported = SimpleITK.ReadImage(str(folder / "export" / "mr_CC_updated.nii.gz"), SimpleITK.sitkFloat32)
+    transform = read_transform(folder, "displacement_CC_updated_inverse")
+    shown = SimpleITK.Resample(undeformed, exported, transform, SimpleITK.sitkLinear, 0.0)
+    ours, theirs = (SimpleITK.GetArrayFromImage(image).ravel() for image in (exported, shown))
+    assert np.corrcoef(ours, theirs)[0, 1] > 0.97
+
+
+def test_the_readme_says_which_points_go_where(case: Case) -> None:
+    text = (case[0] / "export" / "README.txt").read_text()
+    assert "forward   takes a point of the undeformed breast" in text
+    assert "resampling asks for each voxel of the result where it came from" in text
 
 
 def test_the_deformed_volume_lies_where_the_deformation_carries_the_breast(case: Case) -> None:
@@ -124,6 +189,39 @@ def test_meshes_are_right_handed_in_lps(case: Case) -> None:
         assert (np.einsum("ij,ij->i", np.cross(edges[0], edges[1]), edges[2]) > 0).all()
     np.testing.assert_allclose(after.points, between_plates(before.points, laterality), atol=1e-9)
     np.testing.assert_allclose(after.point_data["displacement_mm"], after.points - before.points, atol=1e-9)
+    assert FRAME_FIELD in before.field_data
+
+
+@pytest.mark.parametrize("laterality", ["R", "L"])
+def test_exports_of_a_second_volumes_view_lie_on_that_volume(tmp_path: Path, laterality: Laterality) -> None:
+    inputs = write_pictured_case(tmp_path, laterality, ("3D",))
+    run_figures(tmp_path, inputs, laterality)
+    rows = [r for r in Artefact(inputs["localize"][0]).value("compressed_rows") if r["method"] == "updated"]
+    table = np.array([[row[axis] for axis in "xyz"] for row in rows])
+    marked = mr_landmarks_of(inputs)
+    points = np.array([marked[row["name"]] for row in rows])
+    forward, inverse = (read_transform(tmp_path, f"displacement_3D_updated_{way}") for way in ("forward", "inverse"))
+    np.testing.assert_allclose(carried_by(forward, points), table, atol=0.05)
+    np.testing.assert_allclose(carried_by(inverse, table), points, atol=0.05)
+    # The shift itself is known: without it all of this would lie 7.8 mm away.
+    shift = breast_to_lps(synthetic.SECOND_VOLUME_SHIFT, laterality)
+    np.testing.assert_allclose(table - between_plates(points, laterality, "3D"), np.tile(shift, (2, 1)), atol=0.5)
+    mesh = meshio.read(tmp_path / "export" / "mesh_3D_updated.vtu")
+    carried = carried_by(forward, meshio.read(tmp_path / "export" / "mesh.vtu").points)
+    np.testing.assert_allclose(carried, mesh.points, atol=0.05)
+    second = Artefact(inputs["segment"][0]).volume("compressed_mask")
+    body = nibabel.load(tmp_path / "export" / "mr_3D_updated.nii.gz")
+    inside = np.argwhere(np.asarray(body.dataobj) > 10.0)
+    world = nibabel.affines.apply_affine(body.affine, inside) * [-1, -1, 1]
+    assert np.mean(second.sample(world, order=0) > 0.5) > 0.96
+
+
+def test_a_view_that_cannot_be_placed_on_its_second_volume_is_not_exported(tmp_path: Path) -> None:
+    inputs = write_pictured_case(tmp_path, "R", ("3D",))
+    del inputs["localize"]
+    figures = run_figures(tmp_path, inputs)
+    names = [name for name in figures.value("files") if name.startswith("export/")]
+    assert sorted(names) == ["export/README.txt", "export/mesh.vtu"]
 
 
 def test_a_second_volume_shows_landmarks_between_the_plates_and_a_rerun_is_identical(tmp_path: Path) -> None:
@@ -153,3 +251,22 @@ def test_a_failed_segmentation_leaves_no_picture(tmp_path: Path) -> None:
     figures = run_figures(tmp_path, {"segment": [path]})
     assert figures.status == "failed"
     assert figures.value("files") == []
+
+
+def test_a_case_with_its_share_of_compression_alone_is_drawn_and_exported(tmp_path: Path) -> None:
+    inputs = write_pictured_case(tmp_path, "R", ("3D",), outlined=False)
+    figures = run_figures(tmp_path, inputs)
+    assert figures.status == "ok"
+    assert [picture["name"] for picture in figures.value("pictures")] == ["mesh", "segmentation"]
+    points = inner_points("R")
+    forward = carried_by(read_transform(tmp_path, "displacement_3D_updated_forward"), points)
+    np.testing.assert_allclose(forward, between_plates(points, "R", "3D"), atol=0.02)
+
+
+def test_names_of_lesions_are_fit_for_files_and_stay_apart() -> None:
+    assert file_names(["mass", "calc 1", "calc/1", "calc_1"]) == {
+        "mass": "mass",
+        "calc 1": "calc_1",
+        "calc/1": "calc_1_2",
+        "calc_1": "calc_1_3",
+    }

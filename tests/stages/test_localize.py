@@ -180,6 +180,7 @@ def test_one_view_gives_curve_and_midpoint(tmp_path: Path) -> None:
     curve = found.array("mr/updated/lesion0/curve_CC", "mm")
     assert np.linalg.norm(curve - LESION, axis=1).min() < 0.6
     assert row["z"] == pytest.approx(0.0, abs=3.0)
+    assert "does not determine the depth" in row["message"]
 
 
 def test_a_view_that_failed_leaves_the_other_standing(tmp_path: Path) -> None:

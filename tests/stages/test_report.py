@@ -12,7 +12,7 @@ from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.failures import Failure
 from stages.engine.run import run_stage
-from stages.report.case import mean_text
+from stages.report.case import case_page, mean_text
 from stages.report.cohort import statistics_sections
 from stages.tables.statistics import groups, statistics_rows
 from tests.stages.pictured_case import run_figures, write_pictured_case
@@ -96,6 +96,19 @@ def test_failures_exclusions_and_what_is_safe_to_show(cohort: tuple[Path, dict[s
     assert "moved &amp; blurred" in text
     assert "research use only" in text.lower()
     assert str(cohort[0]) not in text
+
+
+def test_the_page_of_a_case_with_one_view_says_that_the_depth_is_not_determined(tmp_path: Path) -> None:
+    inputs = write_pictured_case(tmp_path, "R", ("CC",))
+    artefacts = [Artefact(path) for stage in ("localize", "evaluate") for path in inputs[stage]]
+    warnings = case_page("case1", "R", artefacts).warnings
+    assert any(text.startswith("CC, lesion: one view does not determine the depth") for text in warnings)
+
+
+def test_numbers_stand_at_the_right(cohort: tuple[Path, dict[str, Any]]) -> None:
+    text = write_report(*cohort, CASES)
+    assert re.search(r'<td class="n">-?\d+\.\d+</td>', text)
+    assert not re.search(r"<td>-?\d+\.\d+</td>", text)
 
 
 def test_links_to_tables_lead_to_files(cohort: tuple[Path, dict[str, Any]]) -> None:

@@ -230,6 +230,9 @@ def test_one_view_gives_the_curve_and_its_middle() -> None:
     assert np.abs(curve[:, :2] - centre[:2]).max() < 2.0
     assert np.ptp(curve[:, 2]) == pytest.approx(2 * np.sqrt(60.0**2 - 30.0**2 - 10.0**2), abs=3.0)
     assert found.point[2] == pytest.approx(0.0, abs=1.0)
+    assert found.message.startswith("one view does not determine the depth of the lesion")
+    (length,) = (float(word) for word in found.message.split() if word.isdigit())
+    assert length == pytest.approx(np.ptp(curve[:, 2]), abs=1.0)
 
 
 def test_a_beam_beside_the_breast_uses_the_nearest_part() -> None:

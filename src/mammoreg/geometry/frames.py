@@ -47,3 +47,17 @@ def breast_to_plate(points: Points, angle_deg: float) -> Points:
 def plate_to_breast(points: Points, angle_deg: float) -> Points:
     """Turn points (..., 3) in mm from the plate into the breast frame."""
     return np.asarray(points, dtype=float) @ plate_rotation(angle_deg)
+
+
+def plate_to_lps_affine(angle_deg: float, laterality: Laterality) -> NDArray[np.float64]:
+    """The plate frame to LPS, (4, 4), mm."""
+    affine = np.eye(4)
+    affine[:3, :3] = plate_rotation(angle_deg).T
+    if laterality == "L":
+        affine[0] *= -1.0
+    return affine
+
+
+def plate_to_lps(points: Points, angle_deg: float, laterality: Laterality) -> Points:
+    """Map points (..., 3) in mm from the plate frame to LPS."""
+    return breast_to_lps(plate_to_breast(points, angle_deg), laterality)

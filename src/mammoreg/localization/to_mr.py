@@ -16,6 +16,7 @@ from mammoreg.localization.lesions import LesionArea
 _CURVE_STEP_MM = 0.5
 _STRETCH = 1.8
 """Bound of the stretch between the plates, by which coarse cells are kept for a closer look."""
+DEPTH_UNKNOWN = "one view does not determine the depth of the lesion"
 _CELLS_ACROSS = 12
 _FINEST_LEVEL = 3
 
@@ -57,6 +58,8 @@ def locate_in_breast(views: Mapping[str, BreastInView], areas: Mapping[str, Lesi
         for name, (_, miss) in beams.items()
         if miss > 0
     ]
+    if len(names) == 1:
+        notes.append(_depth_note(curves[names[0]]))
     region = back_projected_region([(views[name], areas[name]) for name in names])
     midpoint, gap = _beams_meet(list(curves.values()))
     point = midpoint
@@ -65,6 +68,11 @@ def locate_in_breast(views: Mapping[str, BreastInView], areas: Mapping[str, Lesi
     elif len(names) > 1 and region is not None:
         point = region.centres(region.data).mean(axis=0)
     return MrPrediction(point, region, curves, gap, "; ".join(notes))
+
+
+def _depth_note(curve: Points) -> str:
+    length_mm = float(np.linalg.norm(np.diff(curve, axis=0), axis=1).sum())
+    return f"{DEPTH_UNKNOWN}: it may lie anywhere on {length_mm:.0f} mm of the beam, the point is their middle"
 
 
 def _beams_meet(curves: list[Points]) -> tuple[Points, float | None]:

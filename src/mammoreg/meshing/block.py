@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.arrays import Floats, Integers
+from mammoreg.geometry.frames import Laterality
 from mammoreg.meshing.trilinear import shape_functions
+
+# Swapping the ends of the first axis makes the elements of a mirrored block right-handed again.
+_MIRRORED_CORNERS = [1, 0, 3, 2, 5, 4, 7, 6]
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,10 @@ class BlockMesh:
         corners = [(low, low), (high, low), (high, high), (low, high)]
         cells = [grid[i, j, k] for k in (low, high) for i, j in corners]
         return np.stack([cell.ravel(order="F") for cell in cells], axis=1)
+
+    def lps_hexes(self, laterality: Laterality) -> Integers:
+        """Connectivity with positive Jacobians in LPS, where the block of a left breast is mirrored."""
+        return self.hexes() if laterality == "R" else self.hexes()[:, _MIRRORED_CORNERS]
 
     def back_nodes(self) -> Integers:
         """Nodes ((n + 1)^2,) of the back face (k = 0), rim included."""

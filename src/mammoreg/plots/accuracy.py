@@ -39,7 +39,7 @@ def _draw_errors(axes: Axes, panel: ErrorPanel) -> None:
     for place, (method, values) in enumerate(panel.distances.items()):
         found = np.sort(np.asarray(values, dtype=float))
         spread = place + 0.32 * (np.arange(len(found)) % 7 - 3) / 3
-        axes.plot(spread, found, "o", color=method_colour(method), ms=3.8, alpha=0.6, mew=0)
+        axes.plot(spread, found, "o", color=method_colour(method), ms=3.8, alpha=0.6, mec="#555555", mew=0.4)
         if len(found):
             axes.hlines(found.mean(), place - 0.36, place + 0.36, color="#111111", lw=1.8)
     top = _upper_limit(panel)

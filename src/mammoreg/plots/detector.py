@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mammoreg.arrays import Bools
 from mammoreg.localization.lesions import LesionArea
-from mammoreg.plots.style import add_corner_label, add_scale_bar, grey_window
+from mammoreg.plots.style import add_corner_label, add_scale_bar, grey_window, halo
 
 
 @dataclass(frozen=True)
@@ -79,18 +79,20 @@ def _crop_to_breast(axes: Axes, image: DetectorImage, margin_mm: float = 8.0) ->
     axes.set_ylim(bottom, top)
 
 
-def draw_area(axes: Axes, area: LesionArea, image: DetectorImage, colour: str) -> None:
+def draw_area(axes: Axes, area: LesionArea, image: DetectorImage, colour: str, style: str = "-") -> None:
     """Draw the border of a lesion's area, which is in the full image's pixels."""
     part = np.pad(area.mask.astype(float), 1)
     x, y = pixels_to_mm(np.array(area.first) - 1, image.rows, image.pixel_mm)
-    axes.contour(
+    border = axes.contour(
         x + image.pixel_mm * np.arange(part.shape[1]),
         y + image.pixel_mm * np.arange(part.shape[0]),
         part,
         levels=[0.5],
         colors=[colour],
         linewidths=1.6,
+        linestyles=style,
     )
+    border.set_path_effects(halo(1.6))
 
 
 def draw_displacements(

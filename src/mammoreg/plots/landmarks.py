@@ -11,13 +11,13 @@ from mammoreg.geometry import Volume
 from mammoreg.plots.detector import DetectorImage, draw_displacements, line_key, show_detector_image
 from mammoreg.plots.style import (
     TRUE_COLOUR,
+    PicturedBreast,
     Png,
     add_corner_label,
     add_notice,
     add_scale_bar,
     method_colour,
     new_figure,
-    side_name,
     to_png,
 )
 
@@ -35,7 +35,7 @@ class ViewLandmarks:
     predicted: Mapping[str, Points]
 
 
-def landmarks_in_mammograms(views: Sequence[ViewLandmarks], laterality: str) -> Png:
+def landmarks_in_mammograms(views: Sequence[ViewLandmarks], breast: PicturedBreast) -> Png:
     """Per view and method the true places (circles) joined with the predicted ones (crosses)."""
     methods = list(dict.fromkeys(name for view in views for name in view.predicted))
     with new_figure(3.9 * len(methods), 0.5 + 4.0 * len(views)) as figure:
@@ -43,14 +43,14 @@ def landmarks_in_mammograms(views: Sequence[ViewLandmarks], laterality: str) -> 
         for row, view in enumerate(views):
             for column, method in enumerate(methods):
                 axes = panels[row, column]
-                show_detector_image(axes, view.image, laterality, view.view, f"{view.view}, {method}")
+                show_detector_image(axes, view.image, breast.laterality, view.view, f"{view.view}, {method}")
                 if method in view.predicted:
                     draw_displacements(axes, view.true, view.predicted[method], TRUE_COLOUR, method_colour(method))
-        _finish(figure, laterality, "Landmarks in the mammogram")
+        _finish(figure, breast, "Landmarks in the mammogram")
         return to_png(figure)
 
 
-def landmarks_in_volume(mask: Volume, true: Points, predicted: Mapping[str, Points], laterality: str) -> Png:
+def landmarks_in_volume(mask: Volume, true: Points, predicted: Mapping[str, Points], breast: PicturedBreast) -> Png:
     """Landmarks (N, 3), LPS mm, in a second MR volume of which only the body's silhouette is shown."""
     planes = (("from the side", 1, 2, "APIS"), ("from the front", 0, 2, "RLIS"))
     with new_figure(3.9 * len(planes), 0.5 + 3.6 * len(predicted)) as figure:
@@ -67,9 +67,9 @@ def landmarks_in_volume(mask: Volume, true: Points, predicted: Mapping[str, Poin
                 axes.set_ylabel(f"{'xyz'[vertical]} LPS (mm)")
                 for letter, edge in zip(letters, ("left", "right", "bottom", "top"), strict=True):
                     add_corner_label(axes, letter, edge)
-                add_corner_label(axes, f"{laterality} 3D", "upper left")
+                add_corner_label(axes, f"{breast.laterality} 3D", "upper left")
                 add_scale_bar(axes)
-        _finish(figure, laterality, "Landmarks between the plates (second MR volume)")
+        _finish(figure, breast, "Landmarks between the plates (second MR volume)")
         return to_png(figure)
 
 
@@ -90,7 +90,7 @@ def _limit_to(axes: Any, points: Points) -> None:
     axes.set_ylim(low[1], high[1])
 
 
-def _finish(figure: Any, laterality: str, what: str) -> None:
+def _finish(figure: Any, breast: PicturedBreast, what: str) -> None:
     keys = [line_key(TRUE_COLOUR, "circle: true place"), line_key("#555555", "cross: predicted place")]
     figure.legend(handles=keys, loc="outside lower center", ncols=2)
-    add_notice(figure, side_name(laterality), what)
+    add_notice(figure, breast, what)

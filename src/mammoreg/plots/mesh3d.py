@@ -12,7 +12,7 @@ from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 
-from mammoreg.plots.style import Png, add_notice, new_figure, side_name, to_png
+from mammoreg.plots.style import PicturedBreast, Png, add_notice, new_figure, to_png
 
 _MARGIN_MM = 8.0
 _BAR_MM = 50.0
@@ -45,7 +45,7 @@ class PlatesPicture:
         return np.asarray(np.linalg.norm(moved, axis=1))
 
 
-def deformed_meshes(pictures: Sequence[PlatesPicture], laterality: str) -> Png:
+def deformed_meshes(pictures: Sequence[PlatesPicture], breast: PicturedBreast) -> Png:
     """Per view the undeformed and the compressed mesh, coloured by each face's displacement."""
     with new_figure(8.4, 0.4 + 3.7 * len(pictures), layout=None) as figure:
         figure.subplots_adjust(left=0.01, right=0.84, bottom=0.04, top=0.95, wspace=0.16, hspace=0.06)
@@ -54,7 +54,7 @@ def deformed_meshes(pictures: Sequence[PlatesPicture], laterality: str) -> Png:
             states = (("undeformed", picture.undeformed), ("between plates", picture.deformed))
             for column, (name, nodes) in enumerate(states):
                 place = (len(pictures), 2, 2 * row + column + 1)
-                axes = _new_axes(figure, place, f"{laterality} {picture.view}, {name}")
+                axes = _new_axes(figure, place, f"{breast.laterality} {picture.view}, {name}")
                 if name == "between plates":
                     _draw_plates(axes, picture)
                 _draw_surface(axes, nodes, picture, norm)
@@ -62,7 +62,7 @@ def deformed_meshes(pictures: Sequence[PlatesPicture], laterality: str) -> Png:
                 _add_bar(axes)
         beside = figure.add_axes((0.91, 0.25, 0.018, 0.5))
         figure.colorbar(ScalarMappable(norm, colormaps["viridis"]), cax=beside, label="displacement (mm)")
-        add_notice(figure, side_name(laterality), "Model of the breast, plate axes")
+        add_notice(figure, breast, "Model of the breast, plate axes")
         return to_png(figure)
 
 

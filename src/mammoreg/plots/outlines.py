@@ -9,7 +9,16 @@ from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from mammoreg.plots.detector import DetectorImage, line_key, show_detector_image
-from mammoreg.plots.style import TRUE_COLOUR, Png, add_notice, method_colour, new_figure, side_name, to_png
+from mammoreg.plots.style import (
+    TRUE_COLOUR,
+    PicturedBreast,
+    Png,
+    add_notice,
+    method_colour,
+    method_line,
+    new_figure,
+    to_png,
+)
 
 BEFORE = ("rigid", "scaling")
 
@@ -33,7 +42,7 @@ class ViewOutlines:
     models: Mapping[str, NDArray[np.float64]]
 
 
-def outlines_before_and_after(views: Sequence[ViewOutlines], laterality: str) -> Png:
+def outlines_before_and_after(views: Sequence[ViewOutlines], breast: PicturedBreast) -> Png:
     """Per view the outline under methods without mechanics (left) and with mechanics (right)."""
     with new_figure(8.0, 0.5 + 4.2 * len(views)) as figure:
         panels = figure.subplots(len(views), 2, squeeze=False)
@@ -42,15 +51,16 @@ def outlines_before_and_after(views: Sequence[ViewOutlines], laterality: str) ->
             for column, title in enumerate(("before: without mechanics", "after: between plates")):
                 names = [name for name in view.models if (name in BEFORE) == (column == 0)]
                 axes = panels[row, column]
-                show_detector_image(axes, view.image, laterality, view.view, f"{view.view}, {title}")
+                show_detector_image(axes, view.image, breast.laterality, view.view, f"{view.view}, {title}")
                 _draw_outline(axes, view)
                 for name in names:
-                    axes.plot(view.models[name][:, 0], view.models[name][:, 1], color=method_colour(name), lw=1.3)
+                    forward, along = view.models[name].T
+                    axes.plot(forward, along, method_line(name), color=method_colour(name), lw=1.3)
                 shown += [name for name in names if name not in shown]
         keys = [line_key(TRUE_COLOUR, "outline in the image (faint: not skin, not used)")]
-        keys += [line_key(method_colour(name), name) for name in shown]
+        keys += [line_key(method_colour(name), name, method_line(name)) for name in shown]
         figure.legend(handles=keys, loc="outside lower center", ncols=len(keys))
-        add_notice(figure, side_name(laterality), "Outlines of image and model")
+        add_notice(figure, breast, "Outlines of image and model")
         return to_png(figure)
 
 

@@ -3,6 +3,7 @@
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import matplotlib
@@ -10,15 +11,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from numpy.typing import NDArray
 
 Png = NDArray[np.uint8]
 
-TRUE_COLOUR = "#ff3b30"
-PREDICTED_COLOUR = "#2f8bff"
-METHOD_COLOURS = {"rigid": "#b57edc", "scaling": "#e69f00", "plate": "#2ca02c", "updated": PREDICTED_COLOUR}
-OTHER_METHOD_COLOURS = ("#b65fcf", "#00a6a6", "#8c564b")
+# Okabe and Ito's palette, which readers with any colour vision tell apart (jfly.uni-koeln.de/color).
+ORANGE, SKY, GREEN, YELLOW = "#e69f00", "#56b4e9", "#009e73", "#f0e442"
+BLUE, VERMILLION, PURPLE = "#0072b2", "#d55e00", "#cc79a7"
+TRUE_COLOUR = VERMILLION
+PREDICTED_COLOUR = SKY
+METHOD_COLOURS = {"rigid": PURPLE, "scaling": YELLOW, "plate": GREEN, "updated": PREDICTED_COLOUR}
+METHOD_LINES = {"rigid": ":", "scaling": "--", "plate": "--", "updated": "-"}
+OTHER_METHOD_COLOURS = (BLUE, ORANGE, "#999999")
+LESION_COLOURS = (VERMILLION, SKY, YELLOW, "#ffffff", BLUE, PURPLE, GREEN)
 NOTICE = "research use only"
 
 _STYLE: dict[str, Any] = {
@@ -44,6 +50,39 @@ def method_colour(method: str) -> str:
     return METHOD_COLOURS.get(method, OTHER_METHOD_COLOURS[sum(method.encode()) % len(OTHER_METHOD_COLOURS)])
 
 
+def method_line(method: str) -> str:
+    """Line style of a method, which tells it apart without colours."""
+    return METHOD_LINES.get(method, "-.")
+
+
+@dataclass(frozen=True)
+class PicturedBreast:
+    """Whose breast a picture shows, as every picture says.
+
+    Attributes:
+        case: id of the case.
+        laterality: "L" or "R".
+    """
+
+    case: str
+    laterality: str
+
+    @property
+    def head(self) -> str:
+        """Case and side."""
+        return f"{self.case}  ·  {'right' if self.laterality == 'R' else 'left'} breast"
+
+
+def halo(width: float) -> list[AbstractPathEffect]:
+    """A dark edge around a line of some width, which keeps it apart from bright tissue."""
+    return [withStroke(linewidth=width + 1.4, foreground="#000000", alpha=0.55)]
+
+
+def whole_mm(value: float) -> str:
+    """A coordinate to the millimetre; nothing is minus zero."""
+    return f"{round(float(value)) + 0:d} mm"
+
+
 @contextmanager
 def new_figure(
     width_inch: float, height_inch: float, layout: Literal["compressed"] | None = "compressed"
@@ -62,14 +101,9 @@ def to_png(figure: Figure, dpi: int = 130) -> Png:
     return np.frombuffer(buffer.getvalue(), dtype=np.uint8)
 
 
-def add_notice(figure: Figure, side: str, what: str) -> None:
-    """Head line with case content and side, and the notice that no picture goes without."""
-    figure.suptitle(f"{what}  ·  {side}  ·  {NOTICE}", fontsize=9, color="#444444")
-
-
-def side_name(laterality: str) -> str:
-    """`right breast` or `left breast`."""
-    return {"R": "right breast", "L": "left breast"}[laterality]
+def add_notice(figure: Figure, breast: PicturedBreast, what: str) -> None:
+    """Head line with case, side and content, and the notice that no picture goes without."""
+    figure.suptitle(f"{breast.head}  ·  {what}  ·  {NOTICE}", fontsize=9, color="#444444")
 
 
 def add_scale_bar(axes: Axes, length_mm: float = 20.0) -> None:

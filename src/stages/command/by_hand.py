@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -90,7 +91,7 @@ def add_export(commands: Any, program: str) -> None:
         commands,
         "export",
         export,
-        "write what an artefact holds for other programs: meshes as VTU, volumes as NIfTI, tables as CSV",
+        "write what an artefact holds for other programs, in patient coordinates: meshes, volumes, images and tables",
         f"{program} export results/a/mesh.h5 --to out",
     )
     parser.add_argument("artefact", type=Path, help="an artefact, <results>/<case>/<stage>[.<view>].h5")
@@ -144,11 +145,11 @@ def export(given: argparse.Namespace) -> int:
     from stages.engine.artefact import Artefact
     from stages.formats.exporting import export_artefact
 
-    paths = export_artefact(Artefact(given.artefact), given.to)
+    paths, left_out = export_artefact(Artefact(given.artefact), given.to)
     for path in paths:
         print(path)
-    if not paths:
-        print(f"{given.artefact} holds nothing to export")
+    for reason in left_out:
+        print(f"not written: {reason}", file=sys.stderr)
     return 0
 
 

@@ -86,7 +86,7 @@ class CompressFields:
         closed, frame = self.closed, FloatingFrame(self.view.height_mm - self.closed.height_mm)
         deformed = frame.to_plate(closed.deformed)
         arrays = {
-            "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame"),
+            "deformed": Array(deformed, "mm", "mesh nodes between the plates, plate frame", "plate"),
             "residuals": Array(np.array(closed.residuals), "1", "unbalanced over internal forces, each iteration"),
             **_state_arrays(closed, frame),
         }
@@ -171,7 +171,9 @@ def _state_arrays(closed: Closed, frame: FloatingFrame) -> dict[str, Array]:
     kept = memory_arrays(closed.state.memory)
     kept["pressure"] = Array(closed.state.pressure, "kPa", "element pressures, positive in tension")
     if closed.extra is not None:
-        kept[_MEMBRANE] = Array(frame.to_plate(closed.extra), "mm", "nodes of the skin's own membrane, plate frame")
+        kept[_MEMBRANE] = Array(
+            frame.to_plate(closed.extra), "mm", "nodes of the skin's own membrane, plate frame", "plate"
+        )
     return kept
 
 

@@ -1,13 +1,10 @@
 """Files of a digital patient in a hospital's formats, the same bytes for the same contents."""
 
-import gzip
 import io
 from collections.abc import Sequence
 
-import nibabel as nib
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import (
     UID,
@@ -20,6 +17,8 @@ from pydicom.uid import (
 from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.geometry.frames import Laterality
 from stages.engine.contract import Subject
+from stages.formats.images import mask_png
+from stages.formats.nifti import nifti_bytes, volume_affine
 
 VIEW_CODES = {"CC": ("R-10242", "cranio-caudal"), "MLO": ("R-10226", "medio-lateral oblique")}
 ORIENTATION = {
@@ -33,14 +32,10 @@ ORIENTATION = {
 def nifti(volume: Volume, laterality: Laterality, sagittal: bool = False) -> bytes:
     """A breast-frame volume as compressed NIfTI, its planes axial or sagittal."""
     lps = volume.to_lps(laterality)
-    affine = np.diag([*(lps.spacing * np.array([-1.0, -1.0, 1.0])), 1.0])
-    affine[:3, 3] = lps.origin * np.array([-1.0, -1.0, 1.0])
-    data = np.asarray(lps.data)
+    data, affine = np.asarray(lps.data), volume_affine(lps)
     if sagittal:
         data, affine = np.ascontiguousarray(data.transpose(1, 2, 0)), affine[:, [1, 2, 0, 3]]
-    image = nib.Nifti1Image(data, affine)
-    image.header.set_xyzt_units("mm")
-    return gzip.compress(image.to_bytes(), compresslevel=4, mtime=0)
+    return nifti_bytes(data, affine)
 
 
 def mr_dicom(volume: Volume, subject: Subject) -> list[bytes]:
@@ -81,11 +76,9 @@ def _stored(image: NDArray[np.generic], laterality: Laterality) -> NDArray[np.ge
     return np.ascontiguousarray(image[:, ::-1] if laterality == "R" else image)
 
 
-def mask_png(mask: NDArray[np.bool_], laterality: Laterality) -> bytes:
+def stored_mask(mask: NDArray[np.bool_], laterality: Laterality) -> bytes:
     """A canonical mask as PNG in stored orientation, 255 inside."""
-    buffer = io.BytesIO()
-    Image.fromarray(_stored(mask.astype(np.uint8) * 255, laterality)).save(buffer, format="PNG")
-    return buffer.getvalue()
+    return mask_png(_stored(mask, laterality))
 
 
 def mammogram_dicom(

@@ -15,7 +15,7 @@ from mammoreg.phantom.patient import HEADER_ANGLE_DEG, Patient, View
 from mammoreg.phantom.shape import Array as Points
 from mammoreg.phantom.skin_points import skin_points
 from mammoreg.phantom.warp import Deformed
-from stages.digital.dicom import mammogram_dicom, mask_png, mr_dicom, nifti, points_tsv
+from stages.digital.dicom import mammogram_dicom, mr_dicom, nifti, points_tsv, stored_mask
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
 from stages.views import IMAGED, SECOND_VOLUME
 
@@ -153,7 +153,7 @@ class Making:
             pixels, self.subject, view, geometry, thickness, pressed.force_n, self.chosen.monochrome1
         )
         if view not in self.chosen.unseen_views:
-            self.files[f"{name}_lesion.png"] = mask_png(image.lesion_mask, self.subject.laterality)
+            self.files[f"{name}_lesion.png"] = stored_mask(image.lesion_mask, self.subject.laterality)
         self._pixels_file(f"{name}_landmarks.tsv", geometry, deformed.forward(patient.landmarks))
 
     def _pixels_file(self, name: str, geometry: ViewGeometry, places: Points) -> None:

@@ -30,11 +30,15 @@ AXIS_NAMES = {
 
 @dataclass(frozen=True)
 class Array:
-    """A numeric array with its units ("mm", "N", "kPa", "degree", "px", "1") and what it is."""
+    """A numeric array with its units ("mm", "N", "kPa", "degree", "px", "1") and what it is.
+
+    Positions lie in LPS unless `frame` says otherwise.
+    """
 
     data: NDArray[Any]
     units: str
     long_name: str
+    frame: Frame = "LPS"
 
 
 @dataclass(frozen=True)
@@ -235,6 +239,8 @@ def _write_array(parent: Any, name: str, array: Array) -> None:
     node = _subgroup(parent, name).create_dataset(name.rpartition("/")[2], data=_storable(array.data))
     _set_text(node, "units", array.units)
     _set_text(node, "long_name", array.long_name)
+    if array.frame != "LPS":
+        _set_text(node, "frame", array.frame)
 
 
 def _write_volume(parent: Any, name: str, field_: VolumeField) -> None:

@@ -13,9 +13,11 @@ class Caption(NamedTuple):
 CAPTIONS = {
     "overview": Caption(
         "Lesion localisation",
-        "Per view the mammogram, the projection of the MR volume deformed by the model, and slices of the undeformed "
-        "MR volume. Red: the lesion as marked in that image. Blue: in mammogram and projection the lesion predicted "
-        "from the MR volume alone, in the MR slices the lesion predicted from the mammograms alone.",
+        "Per view the mammogram, the projection of the MR volume deformed by the model, and slices of the "
+        "undeformed MR volume through each lesion's predicted place. Solid: the lesion as marked in that image. "
+        "Dashed: in the mammogram and the projection the lesion predicted from the MR volume alone, in the MR "
+        "slices the lesion predicted from the mammograms alone. Several lesions have each a colour. One view does "
+        "not determine the depth: the lesion lies somewhere on the dotted beam, and the cross is only its middle.",
     ),
     "landmarks": Caption(
         "Landmarks in the mammogram",
@@ -29,8 +31,9 @@ CAPTIONS = {
     ),
     "outlines": Caption(
         "Outlines before and after",
-        "Red: the breast's outline in the image, faint where it is not skin and not used. Left: the undeformed breast "
-        "and the volume-preserving scaling. Right: between the plates, and with updated boundary conditions.",
+        "Solid vermillion: the breast's outline in the image, faint where it is not skin and not used. Left: the "
+        "undeformed breast and the volume-preserving scaling. Right: between the plates, and with updated boundary "
+        "conditions.",
     ),
     "mesh": Caption(
         "Deformed mesh",

@@ -4,9 +4,13 @@ from collections.abc import Container, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
+from mammoreg.arrays import Points
 from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.deformation import MethodView
 from mammoreg.meshing.block import BlockMesh
+from mammoreg.plots.style import PicturedBreast
 from stages.engine.artefact import Artefact
 from stages.engine.contract import Inputs
 from stages.localize.record import Predictions
@@ -26,6 +30,12 @@ class PicturedCase:
 
     inputs: Inputs
     laterality: Laterality
+    name: str = ""
+
+    @property
+    def breast(self) -> PicturedBreast:
+        """What every picture says of it."""
+        return PicturedBreast(self.name, self.laterality)
 
     def ok(self, name: str) -> Artefact | None:
         """The artefact of a stage that ended well."""
@@ -52,6 +62,11 @@ class PicturedCase:
     def mammogram_lesions(self) -> list[str]:
         """Names of the lesions marked in the mammograms."""
         return self.predictions.mammogram_lesions if self.predictions else []
+
+    @cached_property
+    def lesions(self) -> list[str]:
+        """Names of all marked lesions, those of the MR volume first; one name is one lesion on both sides."""
+        return list(dict.fromkeys([*self.mr_lesions, *self.mammogram_lesions]))
 
     @cached_property
     def poses(self) -> dict[str, PoseRecord]:
@@ -82,6 +97,22 @@ class PicturedCase:
             return {}
         solutions = [*self.inputs.artefacts("compress"), *self.inputs.artefacts("solve")]
         return {view: method_views(pose, self.mesh.reference, solutions) for view, pose in self.poses.items()}
+
+    @property
+    def second_view(self) -> str | None:
+        """The view whose compression a second MR volume shows; None without such a volume, or where it is unknown."""
+        return self.predictions.compressed_view if self.predictions else None
+
+    def placing(self, view: str, method: str) -> Points | None:
+        """Shift (3,), LPS mm, from where a pose has the deformed breast to where it lies in the patient's coordinates.
+
+        The second MR volume tells it for the view that it shows; None where it does and `localize` has left no answer.
+        """
+        if self.segment is None or self.segment.compressed_mask_lps is None:
+            return np.zeros(3)
+        if self.predictions is None or self.second_view is None:
+            return None
+        return self.predictions.placing(method) if view == self.second_view else np.zeros(3)
 
     def projection(self, view: str) -> ProjectRecord | None:
         """Projections of a view; one whose solve failed still has the other methods."""

@@ -28,7 +28,7 @@ def in_mammograms(case: PicturedCase) -> Png | None:
             predicted = {method: _predicted(predictions, pose, method, list(truth)) for method in offered}
             true = _mm(pose, pose.canonical_pixels(np.array(list(truth.values()))))
             views.append(ViewLandmarks(view, mammogram(pose), true, predicted))
-    return landmarks_in_mammograms(views, case.laterality) if any(v.predicted for v in views) else None
+    return landmarks_in_mammograms(views, case.breast) if any(v.predicted for v in views) else None
 
 
 def _predicted(predictions: Predictions, pose: PoseRecord, method: str, names: list[str]) -> NDArray[np.float64]:
@@ -54,4 +54,4 @@ def in_second_volume(case: PicturedCase) -> Png | None:
             places = [[np.nan] * 3 if row is None else row.point for row in rows]
             predicted[method] = np.array(places, dtype=float)
     true = np.array(list(truth.values()))
-    return landmarks_in_volume(mask, true, predicted, case.laterality) if predicted else None
+    return landmarks_in_volume(mask, true, predicted, case.breast) if predicted else None

@@ -20,9 +20,11 @@ from stages.segment.record import SegmentRecord
 
 def outlines(case: PicturedCase) -> Png | None:
     """The image's outline and the silhouette of every method, per view."""
-    if case.block is None or not case.poses:
+    # A case with nothing but its share of compression has a pose without an image.
+    outlined = [view for view, pose in case.poses.items() if pose.has_outline]
+    if case.block is None or not outlined:
         return None
-    return outlines_before_and_after([_view_outlines(case, view) for view in case.poses], case.laterality)
+    return outlines_before_and_after([_view_outlines(case, view) for view in outlined], case.breast)
 
 
 def _view_outlines(case: PicturedCase, view: str) -> ViewOutlines:
@@ -39,7 +41,7 @@ def _view_outlines(case: PicturedCase, view: str) -> ViewOutlines:
 def meshes(case: PicturedCase) -> Png | None:
     """The mesh before and between the plates, per view that has a solution."""
     pictures = [picture for view in case.poses if (picture := _between_plates(case, view)) is not None]
-    return deformed_meshes(pictures, case.laterality) if pictures else None
+    return deformed_meshes(pictures, case.breast) if pictures else None
 
 
 def _between_plates(case: PicturedCase, view: str) -> PlatesPicture | None:
@@ -62,7 +64,7 @@ def tissues(case: PicturedCase) -> Png | None:
     breast, labels = segment.breast_mask_lps, segment.labels_lps
     gland = labels.with_data((labels.data == Label.GLAND) & (breast.data != 0))
     nipple = segment.nipple_lps
-    return segmentation(segment.mr_lps, breast, gland, _mesh_mask(case, segment, nipple), nipple, case.laterality)
+    return segmentation(segment.mr_lps, breast, gland, _mesh_mask(case, segment, nipple), nipple, case.breast)
 
 
 def _mesh_mask(case: PicturedCase, segment: SegmentRecord, nipple: Points) -> Volume | None:

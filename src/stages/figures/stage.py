@@ -19,7 +19,7 @@ def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     from stages.figures.case import PicturedCase
     from stages.figures.exports import case_exports
 
-    case = PicturedCase(inputs, subject.laterality)
+    case = PicturedCase(inputs, subject.laterality, subject.case)
     failure = first_failure(artefact for name in _ARTEFACTS for artefact in inputs.artefacts(name))
     return figures_fields(_pictures(case), case_exports(case), failure)
 
@@ -42,7 +42,7 @@ def _pictures(case: "PicturedCase") -> list[tuple[Picture, bytes]]:
 
 STAGE = Stage(
     name="figures",
-    schema=1,
+    schema=2,
     inputs=("segment",),
     optional=(
         *_ARTEFACTS[1:],

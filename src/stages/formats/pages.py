@@ -69,7 +69,7 @@ def html_table(section: Section) -> str:
     """The table alone; numbers stand at the right."""
     header = "".join(f"<th>{html.escape(column)}</th>" for column in section.columns)
     body = [
-        "".join(f"<td{' class=n' if _is_number(c) else ''}>{html.escape(c)}</td>" for c in row) for row in section.rows
+        "".join(f"<td{' class=n' if is_number(c) else ''}>{html.escape(c)}</td>" for c in row) for row in section.rows
     ]
     return f"<table><tr>{header}</tr>" + "".join(f"\n<tr>{row}</tr>" for row in body) + "</table>"
 
@@ -93,7 +93,8 @@ def _text(value: Any, decimals: int | None) -> str:
     return text.lstrip("-") if float(text) == 0 else text
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a cell is a number, which stands at the right."""
     try:
         float(text)
     except ValueError:

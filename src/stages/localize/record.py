@@ -146,9 +146,19 @@ def mr_fields(rows: Sequence[MrRow], regions: Sequence[RegionPrediction], lesion
     return Fields(arrays=arrays, volumes=volumes, values=values)
 
 
-def compressed_fields(rows: Sequence[CompressedRow]) -> Fields:
-    """Predictions into the compressed volume."""
-    return Fields(values={"compressed_rows": [asdict(row) for row in rows]})
+def compressed_fields(
+    rows: Sequence[CompressedRow], view: str | None = None, placing: Mapping[str, Points] | None = None
+) -> Fields:
+    """Predictions into the compressed volume.
+
+    Args:
+        rows: of the landmarks.
+        view: whose compression that volume shows.
+        placing: by method, the shift (3,), LPS mm, from where the view's pose has the deformed breast to that volume.
+    """
+    shifts = {method: [float(x) for x in shift] for method, shift in (placing or {}).items()}
+    rows_found = [asdict(row) for row in rows]
+    return Fields(values={"compressed_rows": rows_found, "compressed_view": view, "compressed_placing_mm": shifts})
 
 
 def _area_key(view: str, method: str, number: int) -> str:
@@ -215,6 +225,17 @@ class Predictions:
         """Place of a landmark in the compressed volume; None if there is no point."""
         row = self._compressed.get((method, name))
         return row if row is not None and row.x is not None else None
+
+    @property
+    def compressed_view(self) -> str | None:
+        """The view whose compression the second volume shows; None without one."""
+        view = self._given("compressed_view", None)
+        return None if view is None else str(view)
+
+    def placing(self, method: str) -> Points | None:
+        """Shift (3,), LPS mm, that brings what that view shows deformed onto the second volume."""
+        shifts = self._given("compressed_placing_mm", {})
+        return np.array(shifts[method]) if method in shifts else None
 
     def beam_gaps(self) -> dict[str, float]:
         """Largest gap of the beams to a lesion seen in two views, by method, mm."""

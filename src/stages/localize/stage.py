@@ -103,7 +103,7 @@ def _readable(names: Callable[[], Iterable[str]]) -> list[str]:
 
 STAGE = Stage(
     name="localize",
-    schema=1,
+    schema=2,
     inputs=("segment", "mesh"),
     optional=(
         "pose",

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mammoreg.arrays import Points
-from mammoreg.geometry import breast_to_lps
+from mammoreg.geometry import breast_to_lps, plate_to_breast
 from mammoreg.geometry.frames import Laterality
-from mammoreg.localization.to_compressed import SecondVolume
+from mammoreg.localization.to_compressed import SecondVolume, drawn_to_breast
 from stages.engine.artefact import Fields
 from stages.localize.record import CompressedRow, compressed_fields
 from stages.localize.views import CaseViews
@@ -18,7 +18,7 @@ from stages.second_volume import view_in_second_volume
 def predict_in_compressed(
     views: CaseViews, second: SecondVolume, landmarks: Mapping[str, Points], laterality: Laterality
 ) -> Fields:
-    """Rows `compressed_rows` (LPS).
+    """Rows of the landmarks (LPS), and by how much each method is shifted.
 
     The deformed breast is shifted to the second volume's outline; `rigid` is the best rigid fit of the undeformed
     skin to it.
@@ -31,26 +31,46 @@ def predict_in_compressed(
     view = view_in_second_volume(views.methods)
     rows: list[CompressedRow] = []
     points = np.array(list(landmarks.values())).reshape(-1, 3)
-    if not landmarks:
-        return compressed_fields(rows)
-    for method in METHODS:
-        carried = _carried(views, view, second, method, points)
+    shifts = _shifts(views, view, second)
+    for method in METHODS if landmarks else ():
+        carried = _carried(views, view, second, method, points, shifts)
         if carried is None:
             rows += missing_in_compressed(list(landmarks), _trouble(views, view, method), (method,))
         else:
             rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality))
-    return compressed_fields(rows)
+    moved = {method: _drawn(views, str(view), method) + shift for method, shift in shifts.items()}
+    return compressed_fields(rows, view, {method: breast_to_lps(shift, laterality) for method, shift in moved.items()})
 
 
-def _carried(views: CaseViews, view: str | None, second: SecondVolume, method: str, points: Points) -> Points | None:
+def _shifts(views: CaseViews, view: str | None, second: SecondVolume) -> dict[str, Points]:
+    """By how much (3,) the second volume shifts what each method has deformed, breast frame, mm."""
+    offered = views.methods[view] if view is not None else {}
+    deformed = {method: way for method, way in offered.items() if method != "rigid"}
+    return {method: second.shift(way, views.poses[str(view)].drawn_mm) for method, way in deformed.items()}
+
+
+def _drawn(views: CaseViews, view: str, method: str) -> Points:
+    """How far (3,) the pose has seen the breast drawn over the plates, breast frame, mm."""
+    return plate_to_breast(views.poses[view].drawn_mm, views.methods[view][method].geometry.angle_deg)
+
+
+def _carried(
+    views: CaseViews,
+    view: str | None,
+    second: SecondVolume,
+    method: str,
+    points: Points,
+    shifts: Mapping[str, Points],
+) -> Points | None:
     """Points (N, 3) carried by a method, None where it has no result."""
     if view is None:
         return None
     if method == "rigid":
         return second.rigid(points)
-    if method not in views.methods[view]:
+    if method not in shifts:
         return None
-    return second.place(views.methods[view][method], views.poses[view].drawn_mm, points)
+    way, drawn = views.methods[view][method], views.poses[view].drawn_mm
+    return np.asarray(drawn_to_breast(way, drawn, points) + shifts[method])
 
 
 def _trouble(views: CaseViews, view: str | None, method: str) -> str:

@@ -17,9 +17,11 @@ class ProjectFields:
 
     Attributes:
         step: pixels of the view's image in one of the projection, along each axis.
+        angle_deg: of the plate frame in which the volumes lie.
     """
 
     step: int
+    angle_deg: float
     arrays: dict[str, Array] = field(default_factory=dict)
     volumes: dict[str, VolumeField] = field(default_factory=dict)
     values: dict[str, Value] = field(default_factory=dict)
@@ -41,7 +43,11 @@ class ProjectFields:
 
     def fields(self) -> Fields:
         """The artefact's contents."""
-        return Fields(arrays=self.arrays, volumes=self.volumes, values={"step": self.step, **self.values})
+        return Fields(
+            arrays=self.arrays,
+            volumes=self.volumes,
+            values={"step": self.step, "angle_deg": self.angle_deg, **self.values},
+        )
 
 
 class ProjectRecord(Record):

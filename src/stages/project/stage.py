@@ -33,7 +33,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     segment, mesh, pose = SegmentRecord(required[0]), MeshRecord(required[1]), PoseRecord(required[2])
     tissue, mr = tissue_of_labels(segment.labels, segment.breast_mask), segment.mr
     step = max(1, round(settings.detector_mm / pose.geometry.pixel_mm))
-    found = ProjectFields(step)
+    found = ProjectFields(step, pose.geometry.angle_deg)
     for name, method in method_views(pose, mesh.reference, solutions).items():
         breast = deform_breast(method, mesh.reference.points, settings.grid_mm)
         image, mask = project_breast(breast, tissue, method, step)
@@ -44,7 +44,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
 
 STAGE = Stage(
     name="project",
-    schema=1,
+    schema=2,
     inputs=("segment", "mesh", "pose"),
     optional=_SOLUTIONS,
     settings=Settings,

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mammoreg.localization.to_mr import DEPTH_UNKNOWN
 from mammoreg.metrics.summary import summarise
 from stages.engine.artefact import Artefact
 from stages.engine.completion import first_failures
@@ -71,6 +72,7 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
     """What speaks against the full registration, and what stages remarked."""
     rows = [row for row in VIEWS.rows(artefacts) if row["method"] == SHOWN_METHOD and row.get("trust")]
     found = [f"{row['view']}: {row['trust']}" for row in rows]
+    found += _unknown_depths(artefacts)
     for artefact in artefacts:
         for name in ("warnings", "flags"):
             remarks = artefact.value(name) if artefact.has(name) else []
@@ -78,6 +80,12 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
                 f"{artefact.view or artefact.stage}: {r}" for r in remarks if not any(r in text for text in found)
             ]
     return found
+
+
+def _unknown_depths(artefacts: Sequence[Artefact]) -> list[str]:
+    """Lesions that one view alone shows."""
+    rows = [row for row in PREDICTIONS_MR.rows(artefacts) if row["method"] == SHOWN_METHOD]
+    return [f"{row['views']}, {row['name']}: {row['message']}" for row in rows if DEPTH_UNKNOWN in row["message"]]
 
 
 def _headline(artefacts: Sequence[Artefact]) -> list[tuple[str, str]]:

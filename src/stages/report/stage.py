@@ -6,6 +6,7 @@ from stages.cohort.cases import read_cohort
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.contract import Inputs, NoSettings, Stage, Subject
 from stages.engine.registry import CASE_STAGES, VIEW_STAGES
+from stages.formats.pages import is_number
 from stages.report.case import case_page
 from stages.report.cohort import cards, errors_picture, excluded_rows, findings_section, statistics_sections
 from stages.report.provenance import methods_paragraph, settings_section, versions_section
@@ -55,6 +56,7 @@ def _render(**content: object) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.tests["a_number"] = is_number
     return environment.get_template("report.html.j2").render(**content)
 
 

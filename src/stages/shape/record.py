@@ -25,8 +25,8 @@ def shape_fields(nodes: NDArray[np.int64], deformed: Points, state: DampedState,
     return Fields(
         arrays={
             "surface_nodes": Array(nodes, "1", "numbers of the mesh nodes on the skin, and of the back on the plates"),
-            "surface": Array(deformed[nodes], "mm", "estimated places of these nodes, plate frame"),
-            "deformed": Array(deformed, "mm", "all mesh nodes as the surface was estimated, plate frame"),
+            "surface": Array(deformed[nodes], "mm", "estimated places of these nodes, plate frame", "plate"),
+            "deformed": Array(deformed, "mm", "all mesh nodes as the surface was estimated, plate frame", "plate"),
             "pressure": Array(state.pressure, "kPa", "element pressures there, positive in tension"),
             **memory_arrays(state.memory),
         },

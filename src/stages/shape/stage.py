@@ -41,9 +41,15 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     floating, options = compress.frame.view(pose.geometry), ShapeOptions(**settings.plain())
     drawn = drawn_surface(mesh, closing, closed, floating, outline, compress.stiffness_ratio, options)
     if drawn.estimate is None:
-        return shape_fields(drawn.nodes, compress.deformed, closed.state, {"rounds": 0, **compress.facts()})
+        return shape_fields(
+            drawn.nodes,
+            compress.deformed,
+            closed.state,
+            {"rounds": 0, "angle_deg": compress.angle_deg, **compress.facts()},
+        )
     deformed = compress.frame.to_plate(drawn.closed.deformed)
-    values = _values(drawn, drawn.estimate) | mesh_values(mesh_record, deformed, pose.geometry.angle_deg)
+    values = {"angle_deg": compress.angle_deg} | _values(drawn, drawn.estimate)
+    values |= mesh_values(mesh_record, deformed, pose.geometry.angle_deg)
     return shape_fields(drawn.nodes, deformed, drawn.closed.state, values)
 
 

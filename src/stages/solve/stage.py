@@ -31,7 +31,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     print(seconds_text(solved.report), flush=True)
     deformed = frame.to_plate(solved.deformed)
     return Fields(
-        arrays={"deformed": Array(deformed, "mm", "mesh nodes under the estimated surface, plate frame")},
+        arrays={"deformed": Array(deformed, "mm", "mesh nodes under the estimated surface, plate frame", "plate")},
         values={
             **report_values(solved.report),
             **force_values(plates.force_n(solved.deformed, solved.node_reaction_n, nodes)),
@@ -39,6 +39,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
             "penetration_mm": plates.penetration_mm(solved.deformed),
             "residuals": [float(r) for r in solved.residuals],
             "thickness_mm": compress.thickness_mm,
+            "angle_deg": compress.angle_deg,
         },
     )
 
