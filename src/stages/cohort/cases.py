@@ -1,4 +1,4 @@
-"""The two tables that a user hands in: their models, and the cohort that they describe (contract, inputs)."""
+"""The two tables that a user hands in: their models, and the cohort that they describe."""
 
 import csv
 import difflib

@@ -79,7 +79,7 @@ def fit_rows(
 
 
 def _placed(geometry: ViewGeometry, laterality: str) -> Row:
-    """Pose as the contract's `views.csv` names it: the middle row along (cos a, 0, s sin a) of LPS."""
+    """Pose in the patient: the middle row along (cos a, 0, s sin a) of LPS, s = +1 for a left, -1 for a right side."""
     return {
         "angle_deg": geometry.angle_deg,
         "edge_p_mm": geometry.edge_p_mm,

@@ -28,7 +28,7 @@ _PER_VIEW = ("pose", "compress", "shape", "solve", "project")
 
 
 class Settings(SettingsModel):
-    """When a view's result is marked as not to be trusted; what is measured is bound by the contract."""
+    """When a view's result is marked as not to be trusted; what is measured has no settings."""
 
     outline_p95_limit_mm: float = Field(5.0, gt=0, description="95th percentile of the outline's misfit, mm")
     beam_gap_limit_mm: float = Field(10.0, gt=0, description="gap of the beams to a lesion seen in two views, mm")

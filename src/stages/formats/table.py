@@ -32,7 +32,7 @@ class Table:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """All columns in the order of the contract."""
+        """All columns in the order of the file."""
         return self.order or ("case", *self.keys, *self.numbers, *self.texts)
 
     def rows(self, artefacts: Sequence[Artefact]) -> list[Row]:
