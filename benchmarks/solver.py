@@ -1,6 +1,8 @@
 """Our solver beside every peer on the PATH, on one breast: `make bench`, results/benchmarks/solver.csv.
 
-The breast is a half ellipsoid between two planes, its 7 x 7 x 7 hexahedra subdivided. Every run is a process of its
+The breast is a half ellipsoid between two planes, its 7 x 7 x 7 hexahedra subdivided. Ours takes the road of
+`close_nested` with `benchmarks.breast.OPTIONS`: no friction, one tissue, contact not stiffened at rest. The pipeline
+takes another, `Closing.close`, because friction remembers the way (docs/solver_roads.md). Every run is a process of its
 own on one thread; times are medians of five runs, of one above a minute. `python -m benchmarks.solver --help` names the
 options.
 """
@@ -55,7 +57,7 @@ def run_ours(elements: int, compression: float) -> Row:
     solve = time.perf_counter() - start
     coarse = [f"{round(len(c.deformed) ** (1 / 3)) - 1} a side: {c.iterations}" for c in levels[:-1]]
     solver = "MKL PARDISO" if pypardiso is not None else "SuperLU"
-    note = f"one pressure a hexahedron; {solver}" + (
+    note = f"close_nested, no friction; one pressure a hexahedron; {solver}" + (
         f"; before, on coarser meshes, {', '.join(coarse)}" if coarse else ""
     )
     finest = levels[-1]

@@ -41,6 +41,10 @@ def test_surface_reaches_the_outline_between_the_same_plates(inputs, tmp_path, w
     assert got.value("contact_drift_mm") < 1.0
     assert abs(got.value("volume_change")) < 0.01
     assert got.value("min_det_f") > 0.2
+    # The plates stay while the ties draw towards or away from the source, so that their forces differ a little.
+    assert got.value("force_lower_n") == pytest.approx(got.value("force_upper_n"), rel=0.1)
+    assert got.value("force_lower_n") > 1.0
+    assert abs(got.value("sideways_drift_mm") - inputs[1].value("sideways_drift_mm")) < 1.0
     before, after = inputs[1].array("deformed", "mm"), got.array("deformed", "mm")
     reach = (EDGE - after[:, 1].min()) - (EDGE - before[:, 1].min())
     assert wider_mm - 0.5 < reach < max(wider_mm, 0.0) + 0.5
@@ -98,6 +102,8 @@ def test_without_an_outline_the_surface_is_the_compressions(inputs, tmp_path):
     got = _shaped(inputs, tmp_path, outlined=False)
     np.testing.assert_array_equal(got.array("deformed", "mm"), inputs[1].array("deformed", "mm"))
     assert got.value("rounds") == 0
+    for name in ("penetration_mm", "force_lower_n", "sideways_drift_mm", "folded_corners", "contact_lost"):
+        assert got.value(name) == inputs[1].value(name)
 
 
 def test_failed_compression_is_passed_on(inputs, tmp_path):

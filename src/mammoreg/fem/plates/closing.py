@@ -67,6 +67,7 @@ class Closing:
         moving: which plates move; one that does not stays where it first touches.
 
     Raises:
+        DataError: the plates end in front of the whole breast.
         ValueError: one plate moves, but `lower_mm` says where both end.
     """
 
