@@ -1,6 +1,4 @@
-"""Section `mechanics` of the configuration, the face of `BreastMechanics`."""
-
-from dataclasses import fields
+"""Section `mechanics` of the configuration, the face of `BreastMechanics`, and what of it each stage reads."""
 
 from pydantic import Field
 
@@ -9,13 +7,13 @@ from mammoreg.fem.parts.back import BackName
 from mammoreg.fem.plates.closing import Moving
 from mammoreg.fem.skin.models import SkinName
 from mammoreg.materials.tissue import MaterialName
-from stages.engine.contract import SettingsModel
+from stages.engine.contract import SettingsModel, SharedSettings
 
 _DEFAULTS = BreastMechanics()
 
 
-class Mechanics(SettingsModel):
-    """Tissue, plates and the condition at the breast's back."""
+class _TissueAndSkin(SettingsModel):
+    """What a breast is made of, for stages that tell its tissues."""
 
     material: MaterialName = Field(
         _DEFAULTS.material,
@@ -23,27 +21,12 @@ class Mechanics(SettingsModel):
         "homogeneous: one neo-Hookean tissue, the paper's choice; else fat and gland by that one of the paper's models "
         "(Table II), whose stiffness is its own",
     )
-    poisson_ratio: float = Field(
-        _DEFAULTS.poisson_ratio,
-        ge=0.3,
-        le=0.4999,
-        description="Poisson's ratio of breast tissue: gives the bulk modulus, of one of the paper's models for each "
-        "tissue's stiffness at the view's compression",
-    )
     gland_contrast: float = Field(
         _DEFAULTS.gland_contrast,
         ge=0.1,
         le=1000.0,
         description="shear modulus of gland over fat in material fat_and_gland; 3.4 is the ratio of Wellman's initial "
         "moduli, 15.1 and 4.46 kPa",
-    )
-    fibre_ratio: float = Field(
-        _DEFAULTS.fibre_ratio,
-        ge=0.0,
-        le=20.0,
-        description="stiffness along the nipple axis in tension over the shear modulus (the paper's macroscopic "
-        "anisotropy); "
-        "1 is an order of magnitude, not a fit, and 0 the paper's isotropic tissue",
     )
     skin: SkinName = Field(
         _DEFAULTS.skin,
@@ -56,6 +39,26 @@ class Mechanics(SettingsModel):
         gt=0.0,
         le=1000.0,
         description="Young's modulus of skin, kPa (paper: 10 below 50 % strain)",
+    )
+
+
+class CoarseMechanics(SharedSettings):
+    """Plates, back and tissue of one kind."""
+
+    poisson_ratio: float = Field(
+        _DEFAULTS.poisson_ratio,
+        ge=0.3,
+        le=0.4999,
+        description="Poisson's ratio of breast tissue: gives the bulk modulus, of one of the paper's models for each "
+        "tissue's stiffness at the view's compression",
+    )
+    fibre_ratio: float = Field(
+        _DEFAULTS.fibre_ratio,
+        ge=0.0,
+        le=20.0,
+        description="stiffness along the nipple axis in tension over the shear modulus (the paper's macroscopic "
+        "anisotropy); "
+        "1 is an order of magnitude, not a fit, and 0 the paper's isotropic tissue",
     )
     friction: float = Field(
         _DEFAULTS.friction,
@@ -87,7 +90,6 @@ class Mechanics(SettingsModel):
         le=1000.0,
         description="soft tissue between the model's back and the chest wall, which shears as the back slides, mm",
     )
-
     gravity: GravityName = Field(
         _DEFAULTS.gravity,
         description="standing: while the plates close, the weight changes from that of a prone patient, which the MR "
@@ -98,5 +100,10 @@ class Mechanics(SettingsModel):
     )
 
     def numerics(self) -> BreastMechanics:
-        """The same for `mammoreg`."""
-        return BreastMechanics(**{key.name: getattr(self, key.name) for key in fields(BreastMechanics)})
+        """The same for `mammoreg`; a breast whose tissues are not told is homogeneous and has no skin of its own."""
+        alike = {"material": "homogeneous", "gland_contrast": 1.0, "skin": "none"}
+        return BreastMechanics(**{**alike, **dict(self)})
+
+
+class Mechanics(CoarseMechanics, _TissueAndSkin):
+    """Tissue, skin, plates and the condition at the breast's back."""

@@ -9,7 +9,7 @@ import sys
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel
@@ -68,9 +68,16 @@ def _meaning(info: FieldInfo) -> str:
     """Description, bounds and permitted values of a key."""
     bounds = {"ge": ">=", "gt": ">", "le": "<=", "lt": "<"}
     limits = [f"{sign} {getattr(m, key)}" for m in info.metadata for key, sign in bounds.items() if hasattr(m, key)]
-    choices = getattr(info.annotation, "__args__", ()) if "Literal" in str(info.annotation) else ()
-    extra = [*limits, *([" | ".join(map(str, choices))] if choices else [])]
+    choices = _choices(info.annotation)
+    extra = [*limits, *([" | ".join(choices)] if choices else [])]
     return (info.description or "") + (f" ({', '.join(extra)})" if extra else "")
+
+
+def _choices(annotation: Any) -> list[str]:
+    """Permitted values of an annotation that holds literals, however nested."""
+    if get_origin(annotation) is Literal:
+        return [str(value) for value in get_args(annotation)]
+    return [choice for part in get_args(annotation) for choice in _choices(part)]
 
 
 def _with_tables(readme: str) -> str:

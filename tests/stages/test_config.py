@@ -1,5 +1,6 @@
 """The configuration: defaults, errors with the nearest key, and the texts that are written from the models."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,92 @@ def test_fault_names_the_key_and_the_remedy(values, message):
     with pytest.raises(FaultsError) as caught:
         read_config(values)
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("values", "messages"),
+    [
+        (
+            {"pose": {"mechanics": {"friction": 0.1, "gland_contrast": 2}}},
+            [
+                "config, key pose.mechanics.friction: is unknown; write mechanics.friction, which counts",
+                "config, key pose.mechanics.gland_contrast: is unknown; write mechanics.gland_contrast, which counts",
+            ],
+        ),
+        ({"compress": {"mechanics": {"skn": "none"}}}, ["compress.mechanics.skn: is unknown; write mechanics.skin, "]),
+        ({"compress": {"mechanics": {}}}, ["the section mechanics stands beside compress, not in it"]),
+    ],
+)
+def test_shared_key_in_a_stage_s_section_is_told_its_place(values, messages):
+    with pytest.raises(FaultsError) as caught:
+        read_config(values)
+    assert len(caught.value.faults) == len(messages)
+    for message in messages:
+        assert message in str(caught.value)
+
+
+def test_value_that_is_not_permitted_is_answered_in_the_user_s_words():
+    with pytest.raises(FaultsError) as caught:
+        read_config({"mechanics": {"material": "jelly"}})
+    (fault,) = caught.value.faults
+    assert str(fault).startswith("config, key mechanics.material: 'jelly' is not permitted; input should be 'wellman'")
+    assert "'fat_and_gland'" in str(fault)
+    assert "iteral" not in str(fault)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "readers"),
+    [
+        ("friction", 0.1, {"pose", "compress"}),
+        ("back_layer_mm", 20.0, {"pose", "compress"}),
+        ("material", "homogeneous", {"compress"}),
+        ("gland_contrast", 2.0, {"compress"}),
+        ("skin", "attached", {"compress"}),
+        ("skin_thickness_mm", 2.0, {"compress"}),
+        ("skin_modulus_kpa", 20.0, {"compress"}),
+    ],
+)
+def test_shared_key_changes_the_stages_for_which_it_counts(key, value, readers):
+    plain, changed = read_config({}), read_config({"mechanics": {key: value}})
+    found = {name for name in STAGE_MODULES if stage_settings(plain, name) != stage_settings(changed, name)}
+    assert found == readers
+
+
+def test_pose_and_compress_press_between_the_same_plates():
+    """What pose leaves out is the tissue's difference and the skin, and nothing else."""
+    config = read_config({"mechanics": {"friction": 0.2, "lip_radius_mm": 12.0, "back": "springs", "skin": "attached"}})
+    coarse, fine = (
+        load_stage(name).settings.model_validate(stage_settings(config, name)).mechanics.numerics()
+        for name in ("pose", "compress")
+    )
+    assert (coarse.friction, coarse.lip_radius_mm, coarse.back) == (0.2, 12.0, "springs")
+    assert replace(fine, material="homogeneous", gland_contrast=1.0, skin="none") == coarse
+    assert fine.skin == "attached"
+
+
+def test_every_stage_takes_the_settings_that_the_configuration_gives_it():
+    for name in STAGE_MODULES:
+        settings = load_stage(name).settings
+        given = stage_settings(config_model()(), name)
+        assert settings.model_validate(given) == settings()
+        assert given.keys() == settings.model_fields.keys()
+
+
+def test_keys_stand_in_the_order_in_which_a_run_needs_them():
+    order = [name for name in config_model().model_fields if name in STAGE_MODULES]
+    assert len(order) > 10
+    for place, name in enumerate(order):
+        record = load_stage(name)
+        later = set(order[place:]) & {*record.inputs, *record.optional}
+        assert not later, f"{name} reads {later}, which come after it"
+
+
+def test_permitted_values_are_listed_plainly():
+    for path, text in reference_files(PROJECT).items():
+        assert "Literal" not in text, path
+    text = (PROJECT / "config" / "config.yaml").read_text().replace("\n  #", "")
+    materials = ("wellman", "azar", "samani", "homogeneous", "krouskop", "bakic", "lorenzen", "fat_and_gland")
+    assert f"({' | '.join(materials)})" in text
 
 
 def test_all_faults_come_at_once():

@@ -111,6 +111,17 @@ def test_changed_setting_reruns_its_stage_and_what_follows(finished, tmp_path):
     assert not {"segment", "mesh", "pose", "calibrate"} & set(jobs)
 
 
+@pytest.mark.parametrize(("key", "first"), [("friction", "pose"), ("gland_contrast", "compress"), ("skin", "compress")])
+def test_shared_key_reruns_the_stages_for_which_it_counts(finished, tmp_path, key, first):
+    project, cohort, _ = finished
+    config = tmp_path / "c.yaml"
+    config.write_text(f"mechanics: {{{key}: {'attached' if key == 'skin' else 0.3}}}\n")
+    jobs = _jobs(snakemake(project, "-n", "--configfile", str(config), *_keys(cohort)).stdout)
+    assert {"compress", "shape", "solve", "localize"} <= set(jobs)
+    assert ("pose" in jobs) is (first == "pose")
+    assert not {"segment", "mesh", "calibrate"} & set(jobs)
+
+
 def test_thickness_of_one_view_reruns_that_view_only(finished):
     project, cohort, _ = finished
     table = cohort / "views.tsv"

@@ -10,6 +10,7 @@ import nibabel
 import numpy as np
 from PIL import Image
 
+from stages.engine.contract import Stage
 from stages.engine.registry import CASE_STAGES, COHORT_STAGES, STAGE_MODULES, VIEW_STAGES, load_stage
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -23,10 +24,12 @@ import numpy as np
 from pydantic import Field
 from mammoreg.errors import DataError
 from stages.engine.contract import Array, Fields, SettingsModel, Stage
+from stages.mechanics import CoarseMechanics, Mechanics
 
 class Settings(SettingsModel):
     """Settings of a stage that computes next to nothing."""
     level: float = Field(1.0, ge=0, description="a number")
+{mechanics}
 
 def run(inputs, settings, subject):
     mr = inputs.path("mr")
@@ -66,6 +69,7 @@ def make_project(folder: Path, real: tuple[str, ...] = ()) -> Path:
         module.write_text(
             TOY_STAGE.format(
                 name=name,
+                mechanics=_mechanics(stage),
                 required=stage.inputs,
                 optional=stage.optional,
                 takes_failed=stage.takes_failed,
@@ -74,6 +78,13 @@ def make_project(folder: Path, real: tuple[str, ...] = ()) -> Path:
         )
     (folder / "config/config.yaml").write_text("results: results\n")
     return folder
+
+
+def _mechanics(stage: Stage) -> str:
+    """The key `mechanics` of the stages that have one, with the real stage's model."""
+    info = stage.settings.model_fields.get("mechanics")
+    name = getattr(info.annotation, "__name__", "") if info else ""
+    return f"    mechanics: {name} = {name}()" if name else ""
 
 
 def make_cohort(folder: Path, cases: tuple[str, ...] = ("a", "b", "c")) -> Path:

@@ -13,7 +13,7 @@ from mammoreg.materials.laws import Law
 from mammoreg.materials.mixture import TissueMixture
 
 PaperMaterial = Literal["wellman", "azar", "samani", "homogeneous", "krouskop", "bakic", "lorenzen"]
-MaterialName = PaperMaterial | Literal["fat_and_gland"]
+MaterialName = Literal[PaperMaterial, "fat_and_gland"]
 MATERIALS: tuple[PaperMaterial, ...] = get_args(PaperMaterial)
 """Those of Table II."""
 

@@ -1,4 +1,4 @@
-"""The whole configuration: the cohort's tables, where results go, and each stage's own settings."""
+"""The whole configuration: the cohort's tables, where results go, and the settings that stages share and their own."""
 
 import difflib
 from collections.abc import Mapping
@@ -8,6 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
+from stages.engine.contract import SettingsModel, SharedSettings
 from stages.engine.errors import Fault, FaultsError
 from stages.engine.registry import STAGE_MODULES, load_stage
 
@@ -40,13 +41,56 @@ class CohortKeys(BaseModel):
 
 @cache
 def config_model() -> type[CohortKeys]:
-    """Model of the configuration: `CohortKeys` and one section per stage that has settings."""
+    """Model of the configuration in the pipeline's order: `CohortKeys`, shared sections, one per stage with settings.
+
+    A shared section stands before the first stage that reads it.
+    """
     sections: dict[str, Any] = {}
     for name in STAGE_MODULES:
-        settings = load_stage(name).settings
-        if settings.model_fields:
-            sections[name] = (settings, Field(default_factory=settings, description=f"Stage `{name}`."))
+        for shared, model in _shared(name).items():
+            readers = {stage: _shared(stage)[shared] for stage in STAGE_MODULES if shared in _shared(stage)}
+            widest = max(readers.values(), key=lambda m: len(m.model_fields))
+            if not issubclass(widest, model):
+                raise TypeError(f"keys of {model.__name__} are missing in {widest.__name__}")
+            sections.setdefault(shared, _section(widest, f"{_first_line(widest)} {_who_reads(readers, widest)}"))
+        own = _own(name)
+        if own.model_fields:
+            sections[name] = _section(own, f"Stage `{name}`: {_first_line(own, lower=True)}")
     return create_model("Config", __base__=CohortKeys, **sections)
+
+
+def _section(model: type[BaseModel], description: str) -> tuple[type[BaseModel], Any]:
+    return model, Field(default_factory=model, description=description)
+
+
+def _first_line(model: type[BaseModel], *, lower: bool = False) -> str:
+    text = (model.__doc__ or "").partition("\n")[0]
+    return text[:1].lower() + text[1:] if lower else text
+
+
+def _who_reads(readers: Mapping[str, type[SharedSettings]], widest: type[SharedSettings]) -> str:
+    """Which stages read a shared section, and what some of them do not."""
+    texts = []
+    for stage, model in readers.items():
+        left = ", ".join(key for key in widest.model_fields if key not in model.model_fields)
+        texts.append(f"`{stage}`" + (f" (but for {left})" if left else ""))
+    return f"Read by {' and '.join(texts)}."
+
+
+def _shared(stage: str) -> dict[str, type[SharedSettings]]:
+    """The shared sections that a stage reads, by name."""
+    annotations = {key: info.annotation for key, info in load_stage(stage).settings.model_fields.items()}
+    return {key: a for key, a in annotations.items() if isinstance(a, type) and issubclass(a, SharedSettings)}
+
+
+@cache
+def _own(stage: str) -> type[BaseModel]:
+    """A stage's settings without the shared ones."""
+    settings, shared = load_stage(stage).settings, _shared(stage)
+    if not shared:
+        return settings
+    keys: dict[str, Any] = {k: (i.annotation, i) for k, i in settings.model_fields.items() if k not in shared}
+    return create_model(f"{stage.title()}Section", __base__=SettingsModel, __doc__=settings.__doc__, **keys)
 
 
 def read_config(values: Mapping[str, Any]) -> CohortKeys:
@@ -61,21 +105,47 @@ def read_config(values: Mapping[str, Any]) -> CohortKeys:
     try:
         config = config_model().model_validate(dict(values))
     except ValidationError as error:
-        raise FaultsError(_fault(dict(detail)) for detail in error.errors()) from error
+        raise FaultsError(f for detail in error.errors() for f in _faults(dict(detail))) from error
     if config.views is not None and config.cases is None:
         raise FaultsError([Fault("config, key views", "is given without cases", "give cases=<cases.tsv> as well")])
     return config
 
 
 def stage_settings(config: CohortKeys, name: str) -> dict[str, Any]:
-    """The settings of one stage in JSON types; empty for a stage that has none."""
+    """The settings of one stage in JSON types: its own and, of the shared ones, those that it reads."""
     section = getattr(config, name, None)
-    return section.model_dump(mode="json") if isinstance(section, BaseModel) else {}
+    own = section.model_dump(mode="json") if isinstance(section, BaseModel) else {}
+    shared = {
+        key: getattr(config, key).model_dump(mode="json", include=set(model.model_fields))
+        for key, model in _shared(name).items()
+    }
+    return own | shared
 
 
-def _fault(detail: Mapping[str, Any]) -> Fault:
+def _faults(detail: Mapping[str, Any]) -> list[Fault]:
     """A pydantic error in the words of the configuration's user."""
     keys = [str(key) for key in detail["loc"]]
+    if detail["type"] == "extra_forbidden" and len(keys) == 2 and _is_shared(keys[1]):
+        return _moved(keys[0], keys[1], detail["input"])
+    return [_fault(keys, detail)]
+
+
+def _is_shared(name: str) -> bool:
+    return any(name in _shared(stage) for stage in STAGE_MODULES)
+
+
+def _moved(stage: str, section: str, values: Any) -> list[Fault]:
+    """Shared keys that stand in a stage's section, each with its place."""
+    known, faults = _known_keys([section]), []
+    for key in values if isinstance(values, Mapping) and values else ():
+        (near,) = difflib.get_close_matches(str(key), known, n=1, cutoff=0.0)
+        remedy = f"write {section}.{near}, which counts for every stage"
+        faults.append(Fault(f"config, key {stage}.{section}.{key}", "is unknown", remedy))
+    where = f"config, key {stage}.{section}"
+    return faults or [Fault(where, "is unknown", f"the section {section} stands beside {stage}, not in it")]
+
+
+def _fault(keys: list[str], detail: Mapping[str, Any]) -> Fault:
     where = f"config, key {'.'.join(keys)}"
     if detail["type"] == "extra_forbidden":
         known = _known_keys(keys[:-1])

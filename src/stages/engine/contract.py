@@ -21,6 +21,7 @@ __all__ = [
     "Laterality",
     "NoSettings",
     "SettingsModel",
+    "SharedSettings",
     "Stage",
     "Subject",
     "Value",
@@ -41,6 +42,14 @@ class SettingsModel(BaseModel):
 
 class NoSettings(SettingsModel):
     """Settings of a stage that has none."""
+
+
+class SharedSettings(SettingsModel):
+    """Base of settings that several stages read.
+
+    A stage's field of such a type is a section of the configuration of its own, under the field's name. Each stage's
+    type holds the keys that count for it; the section has those of the stage that reads most, which extends the others.
+    """
 
 
 @dataclass(frozen=True)

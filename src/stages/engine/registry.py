@@ -22,7 +22,12 @@ _STUDIES = {
     "stability": ("stability.stage", "cohort"),
 }
 STUDIES = {name: scope for name, (_, scope) in _STUDIES.items()}
-STAGE_MODULES = {name: f"stages.{name}.stage" for name in ("digital", *CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES)} | {
+# The order in which a run goes through them, and in which their keys stand in the configuration.
+_PIPELINE = (
+    *("digital", "segment", "mesh", "calibrate", "pose", "compress", "shape", "solve", "project"),
+    *("localize", "evaluate", "figures", "tables", "report"),
+)
+STAGE_MODULES = {name: f"stages.{name}.stage" for name in _PIPELINE} | {
     name: f"stages.studies.{module}" for name, (module, _) in _STUDIES.items()
 }
 

@@ -13,7 +13,7 @@ from mammoreg.pose.outlined import OutlinedView
 from mammoreg.pose.search import FoundPose, PoseSearch, find_pose
 from stages.calibrate.record import CalibrateRecord
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.mechanics import Mechanics
+from stages.mechanics import CoarseMechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.affine import affine_maps, rigid_geometry
 from stages.pose.record import PoseFields
@@ -28,11 +28,9 @@ NOT_DRAWN = "breast not drawn to the second volume's outline, for the coarse com
 
 
 class Settings(SettingsModel):
-    """Search for the pose with a coarse compression."""
+    """Search for the pose with a coarse compression of a homogeneous breast without skin."""
 
-    mechanics: Mechanics = Field(
-        Mechanics(), description="plates and back of the coarse compression; its tissue is homogeneous"
-    )
+    mechanics: CoarseMechanics = Field(CoarseMechanics(), description="plates and back of the coarse compression")
     angle_step_deg: float = Field(
         4.0, ge=0.0, le=20.0, description="distance of the angles tried, degrees; 0 keeps the header's angle"
     )
