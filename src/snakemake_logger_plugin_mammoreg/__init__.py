@@ -157,7 +157,7 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
             why = "; the system does so when memory runs out" if signal == "SIGKILL" else ""
             self._write(f"a job was ended by {signal}{why}; run again with fewer cores")
         elif name != "RuleException" and not is_chatter(plain(text)):
-            self._write(plain(text))
+            self._write(plain(text) if name in _MISTAKES else text)
 
     def _write(self, text: str) -> None:
         if not text or text == "None":
