@@ -47,6 +47,7 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
         self._told = 0.0
         self._bar: Bar | None = None
         self._failed = False
+        self._stopped = False
         sys.excepthook = _quiet_when_interrupted
         start_outcome()
 
@@ -95,11 +96,11 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
         super().close()
 
     def _note_outcome(self, record: LogRecord) -> None:
-        event = getattr(record, "event", None)
-        if event == LogEvent.JOB_ERROR:
-            self._failed = True
-        if event == LogEvent.ERROR and not self._failed:
-            note_outcome(MISTAKE if getattr(record, "exception", "") in _MISTAKES else BUG)
+        """Note what ends a run before or beside its jobs; a job notes its own end."""
+        name = getattr(record, "exception", "")
+        if getattr(record, "event", None) == LogEvent.ERROR and name != "RuleException" and not self._failed:
+            note_outcome(MISTAKE if name in _MISTAKES else BUG)
+        self._failed |= name == "RuleException"
 
     def _show(self, record: LogRecord) -> None:
         event = getattr(record, "event", None)
@@ -145,12 +146,14 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
 
     def _fail(self, record: Any) -> None:
         rule, what = self._jobs.get(record.jobid, (record.rule_name, record.rule_name))
-        if rule != "complete" and record.log:
+        if rule != "complete" and record.log and not self._stopped:
             self._write(f"{what} did not finish; its log: {Path(record.log[0]).absolute()}")
 
     def _error(self, record: Any) -> None:
         text, name = record.getMessage(), getattr(record, "exception", "")
         signal = killed_by(text)
+        # A job's exception comes before the message that the job failed.
+        self._stopped = signal in _STOPPED
         if name == "LockException":
             self._write(lock_message(str(Path.cwd()), os.environ.get(COMMAND)))
         elif signal and signal not in _STOPPED:

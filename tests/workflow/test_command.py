@@ -135,6 +135,7 @@ def test_ctrl_c_says_how_to_go_on_and_the_same_command_does(finished, tmp_path):
     process.send_signal(signal.SIGINT)
     text, _ = process.communicate(timeout=120)
     assert process.returncode == 130
+    assert "did not finish" not in text
     assert f"Stopped. What is finished is kept; the same command goes on:\n  {sys.executable} -m mammoreg run" in text
     assert not [word for word in UGLY if word in text]
     assert (tmp_path / "out/a/segment.h5").exists()
