@@ -15,6 +15,7 @@ import yaml
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from stages.code_numbers import code_numbers
 from stages.cohort.cases import CaseRow, ViewRow
 from stages.engine.config import config_model
 
@@ -49,7 +50,12 @@ def _yaml_lines(model: type[BaseModel], defaults: BaseModel, indent: str) -> Ite
     for name, info in model.model_fields.items():
         value = getattr(defaults, name)
         yield "\n" if not indent else ""
-        yield textwrap.fill(_meaning(info), WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ") + "\n"
+        yield (
+            textwrap.fill(
+                _meaning(info) + _origin(info), WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# "
+            )
+            + "\n"
+        )
         if isinstance(value, BaseModel):
             yield f"{indent}{name}:\n"
             yield from _yaml_lines(type(value), value, indent + "  ")
@@ -73,6 +79,16 @@ def _meaning(info: FieldInfo) -> str:
     return (info.description or "") + (f" ({', '.join(extra)})" if extra else "")
 
 
+def _source(info: FieldInfo) -> str:
+    """Where a key's default comes from, empty where its model does not say."""
+    extra = info.json_schema_extra
+    return str(extra.get("source", "")) if isinstance(extra, dict) else ""
+
+
+def _origin(info: FieldInfo) -> str:
+    return f"; {_source(info)}" if _source(info) else ""
+
+
 def _choices(annotation: Any) -> list[str]:
     """Permitted values of an annotation that holds literals, however nested."""
     if get_origin(annotation) is Literal:
@@ -82,7 +98,7 @@ def _choices(annotation: Any) -> list[str]:
 
 def _with_tables(readme: str) -> str:
     """The README with the part between each pair of markers made anew."""
-    parts = {"cases": _columns(CaseRow), "views": _columns(ViewRow), "keys": _keys()}
+    parts = {"cases": _columns(CaseRow), "views": _columns(ViewRow), "keys": _keys(), "sources": _sources()}
     for name, text in parts.items():
         pattern = rf"(?<=<!-- {name} -->\n).*?(?=<!-- end -->)"
         readme = re.sub(pattern, text.replace("\\", r"\\"), readme, count=1, flags=re.DOTALL)
@@ -98,14 +114,27 @@ def _keys() -> str:
     return _table(("key", "default", "meaning"), list(_key_rows(config_model(), config_model()(), "")))
 
 
+def _sources() -> str:
+    """Keys whose model says where the default comes from, then numbers in the code."""
+    keys = [(key, value, _source(info)) for key, value, info in _key_infos(config_model(), config_model()(), "")]
+    code = [(f"`{place}`", f"`{value}`", comment) for place, value, comment in code_numbers()]
+    return _table(("number", "value", "where from"), [*(row for row in keys if row[2]), *code])
+
+
 def _key_rows(model: type[BaseModel], defaults: BaseModel, prefix: str) -> Iterator[tuple[str, ...]]:
+    for key, value, info in _key_infos(model, defaults, prefix):
+        yield key, value, _meaning(info)
+
+
+def _key_infos(model: type[BaseModel], defaults: BaseModel, prefix: str) -> Iterator[tuple[str, str, FieldInfo]]:
+    """Each key with its sections, its default as text, and what the model knows of it."""
     for name, info in model.model_fields.items():
         value = getattr(defaults, name)
         if isinstance(value, BaseModel):
-            yield from _key_rows(type(value), value, f"{prefix}{name}.")
+            yield from _key_infos(type(value), value, f"{prefix}{name}.")
         else:
             text = json.dumps(_json(defaults)[name])
-            yield f"`{prefix}{name}`", f"`{text}`" if len(text) <= LONGEST else "see config.yaml", _meaning(info)
+            yield f"`{prefix}{name}`", f"`{text}`" if len(text) <= LONGEST else "see config.yaml", info
 
 
 def _json(model: BaseModel) -> Mapping[str, Any]:

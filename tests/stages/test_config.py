@@ -1,11 +1,14 @@
 """The configuration: defaults, errors with the nearest key, and the texts that are written from the models."""
 
+import importlib
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
 
+from stages.code_numbers import NUMBERS
 from stages.engine.config import config_model, read_config, stage_settings
 from stages.engine.errors import FaultsError
 from stages.engine.registry import STAGE_MODULES, load_stage
@@ -134,6 +137,38 @@ def test_permitted_values_are_listed_plainly():
     text = (PROJECT / "config" / "config.yaml").read_text().replace("\n  #", "")
     materials = ("wellman", "azar", "samani", "homogeneous", "krouskop", "bakic", "lorenzen", "fat_and_gland")
     assert f"({' | '.join(materials)})" in text
+
+
+def test_every_default_of_the_mechanics_says_where_it_comes_from():
+    """In config.yaml and in the table of config/README.md: a reference, the paper, or the word chosen."""
+    table = _table_of_sources()
+    keys = type(config_model()().mechanics).model_fields
+    assert len(keys) == 15
+    for key in keys:
+        value, origin = table[f"mechanics.{key}"]
+        assert yaml.safe_load(value) == stage_settings(config_model()(), "compress")["mechanics"][key]
+        assert re.match(r"chosen\b|.*\bpaper\b|.*(19|20)\d\d|.*doi ", origin), f"{key}: {origin}"
+        folded = re.sub(r"\n +# ", " ", (PROJECT / "config" / "config.yaml").read_text())
+        assert re.search(rf"; {re.escape(origin)}[^\n]*\n  {key}:", folded), key
+
+
+def test_numbers_in_the_code_stand_in_the_table_with_their_value():
+    table = _table_of_sources()
+    for module, names in NUMBERS.items():
+        for name in names:
+            held = importlib.import_module(module)
+            settings = {"mr_chest_wall": "BackSettings", "options": "ClosingOptions"}.get(module.rsplit(".", 1)[1])
+            value = getattr(getattr(held, settings)() if settings else held, name)
+            text, origin = table[f"{module}.{name}"]
+            assert float(text) == value, name
+            assert "chosen" in origin or "paper" in origin, name
+
+
+def _table_of_sources() -> dict[str, tuple[str, str]]:
+    """Value and origin by number, as config/README.md has them."""
+    text = (PROJECT / "config" / "README.md").read_text().split("<!-- sources -->")[1]
+    rows = [line.strip("| ").split(" | ", 2) for line in text.splitlines() if line.startswith("| `")]
+    return {number.strip("`"): (value.strip("`"), origin) for number, value, origin in rows}
 
 
 def test_all_faults_come_at_once():

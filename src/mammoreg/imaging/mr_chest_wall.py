@@ -27,12 +27,12 @@ class BackSettings:
     forward_share: float = 0.05
     max_depth_mm: float = 120.0
     min_depth_mm: float = 20.0
-    default_tilt: float = 0.15
-    max_tilt: float = 0.25
-    upper_bend: float = 0.6
-    lower_bend: float = 0.35
-    upper_rise: float = 0.5
-    lower_rise: float = 0.15
+    default_tilt: float = 0.15  # chosen: a back without a lateral corner leans as a rounded chest does
+    max_tilt: float = 0.25  # chosen: a steeper lateral corner belongs to the arm
+    upper_bend: float = 0.6  # chosen: the breast goes over into the torso long before its top
+    lower_bend: float = 0.35  # chosen: the fold below is narrower
+    upper_rise: float = 0.5  # chosen: the front of the torso lies halfway to the apex there
+    lower_rise: float = 0.15  # chosen: the fold is shallow
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ from scipy import ndimage
 from mammoreg.arrays import Floats
 from mammoreg.geometry import Volume
 
-CORNER_FULLNESS = 0.6
-"""Share of a ball of some 20 mm that the body must fill at the corner between breast and chest."""
+CORNER_FULLNESS = 0.6  # chosen: share of a ball of some 20 mm that the body must fill between breast and chest
 
 
 def base_corners(body: Volume, apex: Floats) -> tuple[Floats | None, Floats | None]:

@@ -12,10 +12,9 @@ from mammoreg.imaging.correlation import correlation
 from mammoreg.pose.silhouette import detector_mm
 
 PIXEL_MM = 2.0
-# Chosen, not fitted: between the size of a strand of gland and the width over which the thickness changes.
-FINE_MM = 2.0  # smoothing of both images before they are compared
-COARSE_MM = 14.0  # structure wider than this is thickness, not gland
-RIM_MM = 10.0  # thickness changes too fast within this distance from the edge of the breast
+FINE_MM = 2.0  # chosen: smoothing of both images before they are compared
+COARSE_MM = 14.0  # chosen: structure wider than this is thickness, not gland
+RIM_MM = 10.0  # chosen: thickness changes too fast within this distance from the edge of the breast
 MIN_PIXELS = 200
 
 

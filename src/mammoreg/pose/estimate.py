@@ -22,10 +22,10 @@ from mammoreg.pose.outline import RadialOutline
 LOGGER = logging.getLogger(__name__)
 
 # The weights of outline and dense tissue are chosen by what they stand for; none is fitted and none has a source.
-OUTLINE_SAMPLES = 6.0  # independent pieces of information along an outline
-OUTLINE_FLOOR_MM = 1.0  # no model meets an outline better than this for its angle alone
-PATCH_MM = 14.0  # width of an independent patch of dense tissue
-DETERMINED_SHARE = 0.5  # the data must carry at least this share of the angle's information
+OUTLINE_SAMPLES = 6.0  # chosen: independent pieces of information along an outline
+OUTLINE_FLOOR_MM = 1.0  # chosen: no model meets an outline better than this for its angle alone
+PATCH_MM = 14.0  # chosen: width of an independent patch of dense tissue
+DETERMINED_SHARE = 0.5  # chosen: the data must carry at least this share of the angle's information
 ANGLE_STEP_DEG = 0.25  # angles are rounded to it
 AT_BOUND_DEG = 0.5
 

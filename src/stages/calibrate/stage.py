@@ -5,17 +5,27 @@ from pydantic import Field
 from mammoreg.materials.catalogue import CATALOGUE, CatalogueTissue
 from mammoreg.materials.cube import HIGH_COMPRESSION, LOW_COMPRESSION, SULLIVAN, cube_force_n, mu_for_force_kpa
 from mammoreg.materials.laws import NeoHookean
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 
 
 class Settings(SettingsModel):
     """Which force sets the scale of the homogeneous tissue."""
 
     force_n: float = Field(
-        SULLIVAN.median_n, gt=0.0, le=1000.0, description="force at which the tissue is scaled, N (Sullivan's median)"
+        SULLIVAN.median_n,
+        gt=0.0,
+        le=1000.0,
+        description="force at which the tissue is scaled, N",
+        json_schema_extra=source(
+            "the paper's median of Sullivan et al., Radiology 1991;181:355 (the abstract has 122.5)"
+        ),
     )
     compression: float = Field(
-        HIGH_COMPRESSION, gt=0.0, lt=0.9, description="compression of the 240 cm3 cube at that force, share"
+        HIGH_COMPRESSION,
+        gt=0.0,
+        lt=0.9,
+        description="compression of the 240 cm3 cube at that force, share",
+        json_schema_extra=source("the paper's larger compression"),
     )
 
 

@@ -11,7 +11,7 @@ from mammoreg.fem.plates.closing import ClosingOptions
 from stages.calibrate.record import CalibrateRecord
 from stages.compress.gland_map import gland_share
 from stages.compress.record import CompressFields, seconds_text
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, source
 from stages.mechanics import Mechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord
@@ -26,10 +26,22 @@ class Settings(SettingsModel):
         description="where the plates stop: at the thickness of the pose (the paper), or at the force that the "
         "mammogram's header or table gives",
     )
-    load_steps: int = Field(8, ge=1, le=200, description="load steps at least")
-    tolerance_mm: float = Field(0.05, gt=0.0, le=1.0, description="Newton iterations end below this displacement, mm")
+    load_steps: int = Field(
+        8, ge=1, le=200, description="load steps at least", json_schema_extra=source("chosen for convergence")
+    )
+    tolerance_mm: float = Field(
+        0.05,
+        gt=0.0,
+        le=1.0,
+        description="Newton iterations end below this displacement, mm",
+        json_schema_extra=source("chosen: small beside a voxel"),
+    )
     penalty_per_mm: float = Field(
-        2.0, gt=0.0, le=100.0, description="stiffness of the contact in units of the shear modulus, 1/mm"
+        2.0,
+        gt=0.0,
+        le=100.0,
+        description="stiffness of the contact in units of the shear modulus, 1/mm",
+        json_schema_extra=source("chosen for convergence; the contact is stiffened once the plates have closed"),
     )
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, JsonValue
 
 from mammoreg.geometry.frames import Laterality
 from stages.engine.artefact import Array, Artefact, Fields, Value, VolumeField
@@ -26,6 +26,7 @@ __all__ = [
     "Subject",
     "Value",
     "VolumeField",
+    "source",
 ]
 
 
@@ -38,6 +39,14 @@ class SettingsModel(BaseModel):
     def plain(self) -> dict[str, Any]:
         """The settings in JSON types, as artefacts keep them."""
         return dict(json.loads(self.model_dump_json()))
+
+
+def source(text: str) -> dict[str, JsonValue]:
+    """Where a default comes from, for `json_schema_extra`: a reference, or the word chosen and for what.
+
+    config.yaml and config/README.md show it.
+    """
+    return {"source": text}
 
 
 class NoSettings(SettingsModel):

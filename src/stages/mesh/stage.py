@@ -5,7 +5,7 @@ from pydantic import Field
 
 from mammoreg.meshing.breast import BreastMesh, build_mesh
 from mammoreg.meshing.quality import MeshQuality
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.mesh.record import mesh_fields
 from stages.segment.record import SegmentRecord
 
@@ -13,7 +13,7 @@ from stages.segment.record import SegmentRecord
 class Settings(SettingsModel):
     """Settings of the mesh."""
 
-    elements: int = Field(7, ge=3, le=42, description="hexahedra a side (paper: 7)")
+    elements: int = Field(7, ge=3, le=42, description="hexahedra a side", json_schema_extra=source("the paper's"))
     max_volume_error: float = Field(0.02, gt=0.0, description="warn above this share of the mask's volume")
     max_distance_mean_mm: float = Field(1.0, gt=0.0, description="warn above this mean distance of the surfaces, mm")
     max_distance_p95_mm: float = Field(3.0, gt=0.0, description="warn above this 95 % distance of the surfaces, mm")

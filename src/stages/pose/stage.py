@@ -12,7 +12,7 @@ from mammoreg.pose.estimate import PoseEstimate
 from mammoreg.pose.outlined import OutlinedView
 from mammoreg.pose.search import FoundPose, PoseSearch, find_pose
 from stages.calibrate.record import CalibrateRecord
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.mechanics import CoarseMechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.affine import affine_maps, rigid_geometry
@@ -32,11 +32,25 @@ class Settings(SettingsModel):
 
     mechanics: CoarseMechanics = Field(CoarseMechanics(), description="plates and back of the coarse compression")
     angle_step_deg: float = Field(
-        4.0, ge=0.0, le=20.0, description="distance of the angles tried, degrees; 0 keeps the header's angle"
+        4.0,
+        ge=0.0,
+        le=20.0,
+        description="distance of the angles tried, degrees; 0 keeps the header's angle",
+        json_schema_extra=source("chosen: a parabola through three of them finds the best"),
     )
-    angle_bound_deg: float = Field(16.0, gt=0.0, le=45.0, description="largest offset from the header's angle, degrees")
+    angle_bound_deg: float = Field(
+        16.0,
+        gt=0.0,
+        le=45.0,
+        description="largest offset from the header's angle, degrees",
+        json_schema_extra=source("chosen: four steps, a little more than three standard deviations"),
+    )
     angle_sd_deg: float = Field(
-        5.0, gt=0.0, le=30.0, description="standard deviation of the header's angle, chosen, degrees"
+        5.0,
+        gt=0.0,
+        le=30.0,
+        description="standard deviation of the header's angle, degrees",
+        json_schema_extra=source("chosen: how far a breast may be turned on the support unseen by the header"),
     )
     use_density: bool = Field(True, description="let dense tissue judge the angle beside the outline")
 

@@ -10,7 +10,7 @@ from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_b
 from mammoreg.labels import Label
 from stages.bias import n4_field
 from stages.cohort.readers.mr import read_mr, read_nifti
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.segment.record import segment_fields
 
 _SAME_PLACE_MM = 0.1
@@ -21,19 +21,32 @@ class Settings(SettingsModel):
     """The working grid, and where the breast's back lies."""
 
     spacing_mm: float = Field(
-        _DEFAULTS.spacing_mm, ge=1.0, le=3.0, description="voxels of the working grid, mm (paper: 1.4)"
+        _DEFAULTS.spacing_mm,
+        ge=1.0,
+        le=3.0,
+        description="voxels of the working grid, mm",
+        json_schema_extra=source("the paper's"),
     )
     forward_share: float = Field(
         _DEFAULTS.back.forward_share,
         ge=0.0,
         le=0.5,
         description="back in front of the corners between breast and chest, share of their depth",
+        json_schema_extra=source("chosen: the corner itself belongs to the chest"),
     )
     max_depth_mm: float = Field(
-        _DEFAULTS.back.max_depth_mm, ge=40.0, le=250.0, description="greatest depth of the model below the apex, mm"
+        _DEFAULTS.back.max_depth_mm,
+        ge=40.0,
+        le=250.0,
+        description="greatest depth of the model below the apex, mm",
+        json_schema_extra=source("chosen: a mammogram shows no more of a long breast"),
     )
     min_depth_mm: float = Field(
-        _DEFAULTS.back.min_depth_mm, ge=5.0, le=40.0, description="a breast that stands out less is refused, mm"
+        _DEFAULTS.back.min_depth_mm,
+        ge=5.0,
+        le=40.0,
+        description="a breast that stands out less is refused, mm",
+        json_schema_extra=source("chosen: less is no breast between plates"),
     )
 
 

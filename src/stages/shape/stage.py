@@ -8,7 +8,7 @@ from mammoreg.shape.estimate import ShapeEstimate
 from mammoreg.shape.surface import DrawnSurface, ShapeOptions, drawn_surface
 from stages.compress.record import CompressRecord
 from stages.deformed import force_values, mesh_values
-from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value
+from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord
 from stages.shape.record import shape_fields
@@ -24,10 +24,21 @@ class Settings(SettingsModel):
         gt=0.0,
         le=1000.0,
         description="stiffness of the outline's ties in units of the shear modulus",
+        json_schema_extra=source("chosen: the ties win over the tissue"),
     )
-    rounds: int = Field(_LIBRARY.rounds, ge=0, le=20, description="renewals of the ties at most")
+    rounds: int = Field(
+        _LIBRARY.rounds,
+        ge=0,
+        le=20,
+        description="renewals of the ties at most",
+        json_schema_extra=source("chosen: a bound on the work"),
+    )
     settled_mm: float = Field(
-        _LIBRARY.settled_mm, gt=0.0, le=5.0, description="mean misfit at which the silhouette is settled, mm"
+        _LIBRARY.settled_mm,
+        gt=0.0,
+        le=5.0,
+        description="mean misfit at which the silhouette is settled, mm",
+        json_schema_extra=source("chosen: small beside a voxel"),
     )
     facets: int = Field(_LIBRARY.facets, ge=1, le=8, description="facets per face and side for silhouettes")
 

@@ -32,7 +32,7 @@ class ClosingOptions:
     rests: int = 12
     penalty_per_mm: float = 2.0
     band_mm: float = 1.0
-    slip_mm: float = 2.5
+    slip_mm: float = 2.5  # chosen for convergence: a smaller one is nearer to Coulomb's law
     rule: Rule = "simpson"
     contact_factors: tuple[float, ...] = (3.0, 10.0)
     augmentations: int = 0
