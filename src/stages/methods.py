@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 
 from mammoreg.localization.deformation import MeshDeformation, MethodView, ReferenceMesh
-from stages.compress.record import SolutionRecord
 from stages.engine.artefact import Artefact
 from stages.pose.record import PoseRecord
+from stages.solution import SolutionRecord
 
 AFFINE_METHODS = ("rigid", "scaling")
 MESH_METHODS = {"plate": "compress", "updated": "solve"}

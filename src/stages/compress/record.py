@@ -1,6 +1,5 @@
 """What stage `compress` leaves: the breast between two plates, whole enough for other stages to go on from it."""
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -14,14 +13,12 @@ from mammoreg.breast.placed import PlacedBreast, closing_plates, place_breast
 from mammoreg.contact.soft import SoftMemory
 from mammoreg.fem.plates.closing import Closed, Closing, ClosingOptions
 from mammoreg.fem.plates.state import DampedState
-from mammoreg.fem.report import SolveReport
 from mammoreg.geometry import ViewGeometry
 from mammoreg.meshing.block import BlockMesh
-from stages.deformed import FORCE_VALUES, MESH_VALUES, force_values, mesh_values
 from stages.engine.artefact import Array, Artefact, Fields, Value
-from stages.engine.record import Record
 from stages.mechanics import Mechanics
 from stages.mesh.record import MeshRecord
+from stages.solution import SolutionRecord, force_values, mesh_values, report_values
 
 GLAND_SHARE = "gland_fraction"
 """Name of the shares of gland, here and in exported meshes."""
@@ -128,31 +125,6 @@ def closing_report(closed: Closed) -> dict[str, Value]:
     }
 
 
-def report_values(report: SolveReport | None) -> dict[str, Value]:
-    """What an artefact keeps of a solve's report: all but wall times, which differ from run to run."""
-    if report is None:
-        return {}
-    return {
-        "iterations": report.iterations,
-        "load_steps": report.steps,
-        "cut_steps": report.cuts,
-        "unbalance": report.unbalance,
-        "energy_mj": report.isochoric_mj,
-        "volumetric_energy_mj": report.volumetric_mj,
-        "part_energies_mj": dict(report.parts_mj),
-        "min_det_f": report.min_det_f,
-        "volume_change": report.volume_change,
-    }
-
-
-def seconds_text(report: SolveReport | None) -> str:
-    """Where the time of a solve went, for the log."""
-    if report is None:
-        return "no report of the solve"
-    parts = ", ".join(f"{name} {seconds:.2f}" for name, seconds in report.seconds.items())
-    return f"{report.iterations} Newton iterations in {report.steps} load steps; seconds: {parts}"
-
-
 def memory_arrays(memory: SoftMemory) -> dict[str, Array]:
     """What contact points remember, as arrays of an artefact; empty ones are left out."""
     kept = {f.name: getattr(memory, f.name) for f in fields(SoftMemory)}
@@ -175,78 +147,6 @@ def _state_arrays(closed: Closed, frame: FloatingFrame) -> dict[str, Array]:
             frame.to_plate(closed.extra), "mm", "nodes of the skin's own membrane, plate frame", "plate"
         )
     return kept
-
-
-class SolutionRecord(Record):
-    """The breast between the plates as one of the stages with mechanics has solved it."""
-
-    @property
-    def deformed(self) -> Points:
-        """Mesh nodes (N, 3), plate frame, mm."""
-        return np.asarray(self.artefact.array("deformed", "mm"), dtype=float)
-
-    @property
-    def force_n(self) -> float | None:
-        """Mean force of both plates, which balance but for the back's share."""
-        forces = [self._given(f"force_{plate}_n") for plate in ("lower", "upper")]
-        known = [float(force) for force in forces if force is not None]
-        return sum(known) / len(known) if known else None
-
-    @property
-    def min_det_f(self) -> float | None:
-        """Smallest volume ratio at an integration point."""
-        smallest = self._given("min_det_f")
-        return None if smallest is None else float(smallest)
-
-    @property
-    def thickness_mm(self) -> float:
-        """Distance of the plates."""
-        return float(self.artefact.value("thickness_mm"))
-
-    @property
-    def penetration_mm(self) -> float | None:
-        """Deepest point of skin or back inside a plate."""
-        depth = self._given("penetration_mm")
-        return None if depth is None else float(depth)
-
-    @property
-    def folded_corners(self) -> int | None:
-        """Corners of elements that are turned inside out."""
-        count = self._given("folded_corners")
-        return None if count is None else int(count)
-
-    @property
-    def folded_share(self) -> float | None:
-        """Share of the elements with a folded corner."""
-        share = self._given("folded_share")
-        return None if share is None else float(share)
-
-    @property
-    def sideways_drift_mm(self) -> float | None:
-        """Mean sideways motion of the breast over its back."""
-        drift = self._given("sideways_drift_mm")
-        return None if drift is None else float(drift)
-
-    @property
-    def plate_forces_n(self) -> tuple[float, float]:
-        """Forces of the lower and the upper plate."""
-        lower, upper = (float(self.artefact.value(f"force_{plate}_n")) for plate in ("lower", "upper"))
-        return lower, upper
-
-    @property
-    def contact_lost(self) -> bool:
-        """Whether one plate has lost the breast."""
-        return bool(self._given("contact_lost", False))
-
-    def facts(self) -> dict[str, Value]:
-        """What a stage keeps that takes over the solution as it is."""
-        names = ("penetration_mm", "volume_change", "min_det_f", *FORCE_VALUES, *MESH_VALUES)
-        return {name: self.artefact.value(name) for name in names}
-
-    def report(self) -> Mapping[str, Any]:
-        """What the solve came to, by name."""
-        names = ("force_n", "iterations", "load_steps", "min_det_f", "volume_change")
-        return {name: self.artefact.value(name) for name in names}
 
 
 class CompressRecord(SolutionRecord):

@@ -10,11 +10,12 @@ from mammoreg.errors import DataError
 from mammoreg.fem.plates.closing import ClosingOptions
 from stages.calibrate.record import CalibrateRecord
 from stages.compress.gland_map import gland_share
-from stages.compress.record import CompressFields, seconds_text
+from stages.compress.record import CompressFields
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, source
 from stages.mechanics import Mechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord
+from stages.solution import seconds_text
 
 
 class Settings(SettingsModel):

@@ -5,7 +5,7 @@ contents give the same bytes: no clock, no host, no absolute path.
 """
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -186,11 +186,6 @@ class Artefact:
     def _check_units(self, name: str, found: str, asked: str) -> None:
         if found != asked:
             raise ArtefactError(f"{self.path}: {name} is in {found!r}, but {asked!r} was asked for")
-
-
-def first_failure(artefacts: Iterable[Artefact]) -> Failure | None:
-    """The failure of the first artefact that did not end well, which a stage passes on; None if all did."""
-    return next((artefact.failure for artefact in artefacts if artefact.failure), None)
 
 
 def write_artefact(path: Path, attrs: Mapping[str, str], fields: Fields) -> None:

@@ -1,4 +1,4 @@
-"""Whether a cohort is complete: the last thing that a run says."""
+"""What failed first, and whether a cohort is complete: the last thing that a run says."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -10,6 +10,11 @@ from stages.engine.writing import write_bytes
 
 _REMEDY = "Mend the data, or give the row a reason in the column exclude, and run again."
 _BUG_REMEDY = "What was stopped by a bug is tried again after the code has changed, or once its artefact is deleted."
+
+
+def first_failure(artefacts: Iterable[Artefact]) -> Failure | None:
+    """The failure of the first artefact that did not end well, which a stage passes on; None if all did."""
+    return next((artefact.failure for artefact in artefacts if artefact.failure), None)
 
 
 def first_failures(artefacts: Iterable[Artefact]) -> list[tuple[str, Failure]]:

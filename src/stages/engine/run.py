@@ -15,7 +15,8 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from stages.engine.artefact import Artefact, Fields, Value, first_failure, write_artefact
+from stages.engine.artefact import Artefact, Fields, Value, write_artefact
+from stages.engine.completion import first_failure
 from stages.engine.contract import Inputs, Stage, Subject
 from stages.engine.errors import UserError
 from stages.engine.failures import Failure, failure_of

@@ -10,13 +10,14 @@ from mammoreg.meshing.block import BlockMesh
 from mammoreg.metrics.outline_fit import outline_fit
 from mammoreg.pose.outline import RadialOutline
 from mammoreg.pose.silhouette import detector_mm
-from stages.compress.record import CompressRecord, SolutionRecord
+from stages.compress.record import CompressRecord
 from stages.engine.artefact import Artefact
 from stages.evaluate.mechanical_doubts import MechanicalLimits, mechanical_doubts
 from stages.evaluate.record import Row
 from stages.methods import MESH_METHODS, of_view
 from stages.pose.record import FINE_RAYS, PoseRecord
 from stages.project.record import ProjectRecord
+from stages.solution import SolutionRecord
 from stages.views import SECOND_VOLUME
 
 COMPRESSION_POINTS = 3.0

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from stages.compress.record import SolutionRecord
+from stages.solution import SolutionRecord
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from pydantic import Field
 
 from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_landmarks, view_lesion_names
 from stages.elongation import elongation_rows
-from stages.engine.artefact import Fields, first_failure
+from stages.engine.artefact import Fields
+from stages.engine.completion import first_failure
 from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
 from stages.evaluate.fit import Limits, fit_rows
 from stages.evaluate.mechanical_doubts import MechanicalLimits

@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from stages.engine.artefact import Fields, first_failure
+from stages.engine.artefact import Fields
+from stages.engine.completion import first_failure
 from stages.engine.contract import Inputs, NoSettings, Stage, Subject
 from stages.figures.record import Picture, figures_fields
 from stages.views import IMAGED

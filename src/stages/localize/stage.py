@@ -10,7 +10,8 @@ from mammoreg.geometry import lps_to_breast
 from mammoreg.geometry.frames import Laterality
 from mammoreg.meshing.block import BlockMesh
 from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_lesion_names
-from stages.engine.artefact import Artefact, Fields, first_failure
+from stages.engine.artefact import Artefact, Fields
+from stages.engine.completion import first_failure
 from stages.engine.contract import Failure, Inputs, NoSettings, Stage, Subject, Value
 from stages.localize.record import compressed_fields, mammogram_fields, mr_fields
 from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed

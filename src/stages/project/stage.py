@@ -6,7 +6,7 @@ from pydantic import Field
 
 from mammoreg.projection.comparison import projection_correlation
 from mammoreg.projection.method import deform_breast, project_breast, tissue_of_labels
-from stages.engine.artefact import first_failure
+from stages.engine.completion import first_failure
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
 from stages.mesh.record import MeshRecord
 from stages.methods import MESH_METHODS, method_views

@@ -7,11 +7,11 @@ from mammoreg.pose.alignment import Alignment
 from mammoreg.shape.estimate import ShapeEstimate
 from mammoreg.shape.surface import DrawnSurface, ShapeOptions, drawn_surface
 from stages.compress.record import CompressRecord
-from stages.deformed import force_values, mesh_values
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord
 from stages.shape.record import shape_fields
+from stages.solution import force_values, mesh_values
 
 _LIBRARY = ShapeOptions()
 

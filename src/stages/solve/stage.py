@@ -4,11 +4,11 @@ from pydantic import Field
 
 from mammoreg.breast.interior import plates_around, solve_interior
 from mammoreg.fem.prescribed.equilibrium import NewtonOptions
-from stages.compress.record import CompressRecord, report_values, seconds_text
-from stages.deformed import force_values, mesh_values
+from stages.compress.record import CompressRecord
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject
 from stages.mesh.record import MeshRecord
 from stages.shape.record import ShapeRecord
+from stages.solution import force_values, mesh_values, report_values, seconds_text
 
 
 class Settings(SettingsModel):

@@ -13,7 +13,7 @@ from mammoreg.localization.deformation import MeshDeformation, MethodView
 from mammoreg.localization.to_compressed import SecondVolume
 from stages.annotations import mr_landmarks
 from stages.elongation import elongation_rows
-from stages.engine.artefact import first_failure
+from stages.engine.completion import first_failure
 from stages.engine.contract import Inputs
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord

@@ -16,10 +16,11 @@ from pydantic import Field
 from mammoreg.arrays import Points
 from mammoreg.errors import DataError, NotConvergedError
 from mammoreg.materials.tissue import MATERIALS
-from stages.compress.record import CompressRecord, SolutionRecord
+from stages.compress.record import CompressRecord
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.contract import Inputs, SettingsModel, Stage, Subject
 from stages.mechanics import Mechanics
+from stages.solution import SolutionRecord
 from stages.studies.chain import Plan, plan_of, run_chain
 from stages.studies.volunteer.additional_points import draw_to_points, surface_points
 from stages.studies.volunteer.case import Landmarks, VolunteerCase, volunteer_case, volunteer_landmarks

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mammoreg.geometry import breast_to_lps, breast_to_plate
-from stages.deformed import force_values, mesh_values
 from stages.engine.artefact import Artefact
 from stages.mesh.record import MeshRecord
+from stages.solution import force_values, mesh_values
 from tests.stages.synthetic_case import box, write_mesh
 
 ANGLE = 30.0
