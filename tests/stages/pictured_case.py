@@ -47,6 +47,11 @@ def run_figures(folder: Path, inputs: dict[str, Any], laterality: Laterality = "
     return Artefact(_run("figures", folder, inputs, laterality, None))
 
 
+def run_per_case(stage: str, folder: Path, inputs: dict[str, Any], laterality: Laterality = "R") -> Path:
+    """Run a stage of the case once more, with changed inputs."""
+    return _run(stage, folder, inputs, laterality, None)
+
+
 def _run(stage: str, folder: Path, inputs: dict[str, Any], laterality: Laterality, view: str | None) -> Path:
     from stages.engine.registry import load_stage
 

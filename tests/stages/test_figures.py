@@ -19,11 +19,13 @@ from stages.formats.vtu import FRAME_FIELD
 from stages.pose.record import PoseRecord
 from tests.stages import synthetic_case as synthetic
 from tests.stages.pictured_case import (
+    FLIPS,
     LESION,
     LESION_DIAMETER_MM,
     MR_AFFINE,
     MR_SHAPE,
     run_figures,
+    run_per_case,
     world_centroid,
     write_pictured_case,
 )
@@ -261,6 +263,28 @@ def test_a_case_with_its_share_of_compression_alone_is_drawn_and_exported(tmp_pa
     points = inner_points("R")
     forward = carried_by(read_transform(tmp_path, "displacement_3D_updated_forward"), points)
     np.testing.assert_allclose(forward, between_plates(points, "R", "3D"), atol=0.02)
+
+
+def test_one_name_is_one_lesion_in_the_files_of_both_sides(tmp_path: Path) -> None:
+    inputs = write_pictured_case(tmp_path, "R", ("CC",))
+    places = {"mass": LESION, "cyst 2": np.array([-20.0, -30.0, -14.0])}
+    rows = [f"{name}\t" + "\t".join(f"{x:.3f}" for x in place) + "\t9" for name, place in places.items()]
+    inputs["mr_lesion"].write_text("\n".join(["name\tx\ty\tz\tdiameter_mm", *rows, ""]))
+    column, row = synthetic.stored(synthetic.true_pixel("CC", places["cyst 2"]), FLIPS)
+    inputs["lesion_CC"] = tmp_path / "cyst.tsv"
+    inputs["lesion_CC"].write_text(f"name\tcolumn\trow\tdiameter_mm\ncyst 2\t{column:.2f}\t{row:.2f}\t9\n")
+    inputs["localize"] = [run_per_case("localize", tmp_path, inputs)]
+    run_figures(tmp_path, inputs)
+    names = [path.name for path in (tmp_path / "export").iterdir()]
+    assert "lesion_cyst_2_updated_CC.png" in names
+    assert "lesion_mass_updated_CC.png" in names
+    assert "lesion_mass_updated_mr.nii.gz" not in names, "no mammogram marks it"
+    found = world_centroid(tmp_path / "export" / "lesion_cyst_2_updated_mr.nii.gz")
+    assert np.abs(found - places["cyst 2"])[:2].max() < 3.0
+    assert (tmp_path / "export" / "lesions.tsv").read_text().splitlines()[1:] == [
+        "mass\tmass\tmr",
+        "cyst_2\tcyst 2\tmr+mammograms",
+    ]
 
 
 def test_names_of_lesions_are_fit_for_files_and_stay_apart() -> None:

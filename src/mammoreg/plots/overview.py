@@ -164,7 +164,7 @@ def _draw_cut(
         overlays.append(SliceOverlay(shadow(mr.true[cut.name], plane), colours.true(cut.name), _BESIDE))
     show_slice(axes, mr.volume, plane, cut.through, overlays, f"{cut.name}: {title}" if len(mr.cuts) > 1 else title)
     if off_mm > 0.0:
-        add_corner_label(axes, f"marked (dotted): {whole_mm(off_mm)} off", "upper left")
+        add_corner_label(axes, f"marked (dotted)\n{whole_mm(off_mm)} off", "upper left")
     if cut.curve is not None:
         draw_curve(axes, cut.curve, plane, colours.predicted(cut.name))
         draw_point(axes, cut.through, plane, colours.predicted(cut.name))

@@ -37,7 +37,8 @@ class ProjectFields:
         """One method's projection and its silhouette, the image's correlation with it, and the MR volume it deforms."""
         self.arrays[f"{method}/projection"] = Array(image, "1", f"attenuation at 20 keV, method {method}, by blocks")
         self.arrays[f"{method}/mask"] = Array(mask, "1", f"silhouette of the breast, method {method}, by blocks")
-        self.values[f"{method}_ncc"] = correlation
+        if correlation is not None:
+            self.values[f"{method}_ncc"] = correlation
         if deformed_mr is not None:
             self.volumes[f"{method}/mr"] = VolumeField(deformed_mr, "1", f"MR volume, method {method}")
 
