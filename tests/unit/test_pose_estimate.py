@@ -212,3 +212,23 @@ def test_candidates_tell_the_models_rim_from_skin() -> None:
     for candidate in found.candidates:
         assert 0.05 < candidate.rim_share < 0.5
         assert abs(candidate.skin.rms_mm - candidate.alignment.rms_mm) > 0.5
+
+
+def test_a_wide_gap_on_a_few_rays_counts_by_its_size_in_the_misfit_too() -> None:
+    """As in the alignment: the model's rim comes into sight at some angles and not at their neighbours."""
+    whole = Press(breast(LONG).points)
+
+    def with_a_flap(view: ViewGeometry) -> Compressed | None:
+        nodes = pressed(whole.points, view.angle_deg)
+        flap = (nodes[:, 0] > 40.0) & (np.abs(nodes[:, 1] + 30.0) < 14.0) & (view.angle_deg > 2.0)
+        return Compressed(nodes + np.outer(flap, [40.0, 0.0, 0.0]), -0.5 * VIEW.thickness_mm)
+
+    facets = skin_facets(breast(LONG).skin_quads(), len(whole.points), 2)
+    found = estimate_pose(VIEW, taken(LONG, 6.0)[0], with_a_flap, facets, 4.0, 16.0, 5.0)
+    assert found is not None
+    at = {c.angle_deg: c for c in found.candidates}
+    gap, weight = np.abs(np.nan_to_num(at[4.0].alignment.gap_mm)), at[4.0].alignment.weight
+    loss = np.average(np.where(gap < 4.0, gap**2, 8.0 * gap - 16.0), weights=weight)
+    assert at[4.0].misfit == pytest.approx(6.0 * np.log(loss + 1.0) + (4.0 / 5.0) ** 2)
+    assert at[4.0].alignment.rms_mm > 1.4 * np.sqrt(loss)
+    assert at[0.0].alignment.robust_mm == at[0.0].alignment.rms_mm

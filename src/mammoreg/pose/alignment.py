@@ -34,6 +34,14 @@ class Alignment:
     weight: NDArray[np.float64]
     rms_mm: float
 
+    @property
+    def robust_mm(self) -> float:
+        """As `rms_mm`, by the loss that `align` minimises: beyond Huber's limit a gap's size counts, not its square."""
+        total = float(self.weight.sum())
+        size = np.abs(np.nan_to_num(self.gap_mm))
+        loss = np.where(size < HUBER_MM, size**2, HUBER_MM * (2.0 * size - HUBER_MM))
+        return float(np.sqrt(np.sum(self.weight * loss) / total)) if total > 0 else float("nan")
+
 
 def measure(
     points: Points,

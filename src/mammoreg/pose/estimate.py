@@ -140,7 +140,7 @@ def estimate_pose(
         skin = facets.positions(compressed.nodes)
         state = align(skin, facets.quads, at, outline)
         ncc, patches = _density(compressed.nodes, state.view, tissue, mammogram)
-        misfit = _misfit(state.rms_mm, ncc, patches, offset_deg / prior_sd_deg)
+        misfit = _misfit(state.robust_mm, ncc, patches, offset_deg / prior_sd_deg)
         tried_at = "angle %.2f degrees: outline %.2f mm, dense tissue %.3f, misfit %.3f"
         LOGGER.info(tried_at, at.angle_deg, state.rms_mm, ncc, misfit)
         on_skin = measure(skin, facets.quads, state.view, outline, facets.rim)
@@ -177,12 +177,12 @@ def _bracketed(judge: Callable[[float], Candidate | None], step_deg: float, boun
     return tried
 
 
-def _misfit(rms_mm: float, ncc: float, patches: float, offset: float) -> float:
+def _misfit(outline_mm: float, ncc: float, patches: float, offset: float) -> float:
     """Minus twice the log likelihood of outline and dense tissue, plus the prior.
 
     The outline's error is the model's own and of unknown size, so its variance is profiled out.
     """
-    by_outline = OUTLINE_SAMPLES * np.log(rms_mm**2 + OUTLINE_FLOOR_MM**2)
+    by_outline = OUTLINE_SAMPLES * np.log(outline_mm**2 + OUTLINE_FLOOR_MM**2)
     by_density = patches * np.log(1.0 - max(ncc, 0.0) ** 2)
     return float(by_outline + by_density + offset**2)
 

@@ -133,6 +133,7 @@ def _search_values(found: PoseEstimate) -> dict[str, Value]:
             {
                 "angle_deg": c.angle_deg,
                 "outline_rms_mm": c.alignment.rms_mm,
+                "outline_robust_mm": c.alignment.robust_mm,
                 "skin_rms_mm": c.skin.rms_mm if np.isfinite(c.skin.rms_mm) else None,
                 "rim_share": c.rim_share,
                 "density_ncc": c.ncc,
