@@ -147,7 +147,7 @@ def test_what_a_second_volume_places_is_refused_with_the_reason(tmp_path, capsys
     assert main(["export", str(tmp_path / "solve.h5"), "--to", str(tmp_path / "out")]) == 0
     error = capsys.readouterr().err
     for name in ("deformed", "surface", "updated/mr"):
-        assert f"not written: {name}: a second MR volume's outline places it" in error
+        assert f"not written: {name}: `localize` alone places it" in error
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["README.txt", "mask.png", "projection.tiff"]
 
 

@@ -100,7 +100,7 @@ def _listing(artefact: Artefact, kind: Any) -> list[tuple[str, tuple[int, ...], 
 def _unplaced(artefact: Artefact) -> str:
     """Why what is in the plate frame cannot be placed in the patient; empty where it can."""
     if artefact.view == SECOND_VOLUME:
-        return "a second MR volume's outline places it, which `localize` does: take it from the case's folder `export`"
+        return "`localize` alone places it, on the second MR volume if any: take it from the case's folder `export`"
     return "" if artefact.has("angle_deg") else "its artefact does not hold the angle of its plates"
 
 
