@@ -29,6 +29,8 @@ from stages.mechanics import CoarseMechanics, Mechanics
 class Settings(SettingsModel):
     """Settings of a stage that computes next to nothing."""
     level: float = Field(1.0, ge=0, description="a number")
+    elements: int = Field(7, ge=1, description="of the true mesh; the documents set it")
+    use_density: bool = Field(True, description="of the true pose; the documents set it")
 {mechanics}
 
 def run(inputs, settings, subject):
