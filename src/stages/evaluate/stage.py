@@ -46,7 +46,7 @@ class Settings(SettingsModel):
         gt=0,
         le=1,
         description="elements with a folded corner, as a share of all; a few at the breast's rim "
-        "are usual (chosen: sound compressions have up to 0.026)",
+        "are usual (chosen: sound compressions have up to 0.02)",
     )
     drift_limit: float = Field(
         0.06,
