@@ -25,9 +25,7 @@ def module_digest(module: str, source: Path = SOURCE) -> str:
             pending.extend(_imports(name, source))
     digest = hashlib.sha256()
     for name in sorted(seen):
-        digest.update(f"{name}\n{_syntax(name, source)}\n".encode())
-        for path in _data_files(name, source):
-            digest.update(path.read_bytes())
+        digest.update(_content(name, source))
     return digest.hexdigest()
 
 
@@ -59,15 +57,35 @@ def _imports(module: str, source: Path) -> tuple[str, ...]:
     return tuple(sorted(name for name in ours | parents if _file(name, source) is not None))
 
 
+@cache
+def _content(module: str, source: Path) -> bytes:
+    """What of a module counts: its name, its syntax and the data files that it names."""
+    return b"".join(
+        [f"{module}\n{_syntax(module, source)}\n".encode(), *map(Path.read_bytes, _data_files(module, source))]
+    )
+
+
 def _data_files(module: str, source: Path) -> list[Path]:
     """Files beside a module that it names in a text constant, such as a folder of templates."""
     path = _file(module, source)
+    beside = _data_beside(path.parent if path else source)
+    if not beside:
+        return []
     texts = {n.value for n in ast.walk(_parse(module, source)) if isinstance(n, ast.Constant) and type(n.value) is str}
-    folder = path.parent if path else source
-    named = [folder / text for text in sorted(texts) if re.fullmatch(r"[\w.-]*\w", text)]
-    folders = [p for p in named if p.is_dir() and not (p / "__init__.py").exists()]
-    files = [p for p in named if p.is_file() and p.suffix != ".py"]
+    named = [beside[text] for text in sorted(texts & beside.keys())]
+    folders, files = [p for p in named if p.is_dir()], [p for p in named if p.is_file()]
     return files + [member for folder in folders for member in sorted(folder.rglob("*")) if member.is_file()]
+
+
+@cache
+def _data_beside(folder: Path) -> dict[str, Path]:
+    """Files and folders in a folder, by name, that are no modules and no packages."""
+    data = [p for p in folder.iterdir() if re.fullmatch(r"[\w.-]*\w", p.name) and p.name != "__pycache__"]
+    return {
+        p.name: p
+        for p in data
+        if (p.is_dir() and not (p / "__init__.py").exists()) or (p.is_file() and p.suffix != ".py")
+    }
 
 
 @cache
