@@ -35,7 +35,7 @@ class Settings(SettingsModel):
 
 def run(inputs, settings, subject):
     mr = inputs.path("mr")
-    if mr is not None:
+    if mr is not None and {name!r} == "segment":
         import nibabel
         if np.isnan(np.asanyarray(nibabel.load(mr).dataobj)).any():
             raise DataError(f"{{mr}}: holds NaN; export the volume again")
