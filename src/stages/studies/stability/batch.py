@@ -54,8 +54,8 @@ def batch_of(batch: int, batches: int) -> list[Scenario]:
 def _tried(scenario: Scenario, scan: Artefact | None, limit_s: float) -> Trial:
     if scenario.shape == SCAN and scan is None:
         return Trial(None, NO_SCAN)
-    if scenario.shape == SCAN and scan is not None and not scan.ok:
-        return Trial(None, f"not run: {scan.message}")
+    if scenario.shape == SCAN and scan is not None and scan.failure:
+        return Trial(None, f"not run: {scan.failure.message}")
     mesh = _mesh(scenario, scan)
     try:
         return in_own_process(partial(try_scenario, scenario, mesh), limit_s)
