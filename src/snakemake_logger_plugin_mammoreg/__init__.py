@@ -18,7 +18,7 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from stages.command.progress import Progress
-from stages.command.snakemake_words import is_chatter, killed_by, lock_message, plain
+from stages.command.snakemake_words import is_chatter, killed_by, lock_message, mistake_within, plain
 from stages.engine.outcome import BUG, MISTAKE, note_outcome, start_outcome
 
 COMMAND = "MAMMOREG_COMMAND"
@@ -99,7 +99,8 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
         """Note what ends a run before or beside its jobs; a job notes its own end."""
         name = getattr(record, "exception", "")
         if getattr(record, "event", None) == LogEvent.ERROR and name != "RuleException" and not self._failed:
-            note_outcome(MISTAKE if name in _MISTAKES else BUG)
+            mistake = name in _MISTAKES or mistake_within(record.getMessage()) is not None
+            note_outcome(MISTAKE if mistake else BUG)
         self._failed |= name == "RuleException"
 
     def _show(self, record: LogRecord) -> None:
@@ -160,7 +161,7 @@ class LogHandler(LogHandlerBase):  # type: ignore[misc]
             why = "; the system does so when memory runs out" if signal == "SIGKILL" else ""
             self._write(f"a job was ended by {signal}{why}; run again with fewer cores")
         elif name != "RuleException" and not is_chatter(plain(text)):
-            self._write(plain(text) if name in _MISTAKES else text)
+            self._write(mistake_within(text) or (plain(text) if name in _MISTAKES else text))
 
     def _write(self, text: str) -> None:
         if not text or text == "None":

@@ -26,7 +26,8 @@ def _pose(folder, image, row):
     segment, mesh = write_segment(folder / "segment.h5", "R"), write_mesh(folder / "mesh.h5", "R")
     write_artefact(folder / "calibrate.h5", header("calibrate", "R"), Fields(values={"mu_kpa": 9.4}))
     inputs = {"segment": segment, "mesh": mesh, "calibrate": folder / "calibrate.h5", "image": image}
-    run_stage("pose", inputs, folder / "pose.CC.h5", {}, Subject("c1", "R", "CC", row))
+    # This breast has no tissues.
+    run_stage("pose", inputs, folder / "pose.CC.h5", {"use_density": False}, Subject("c1", "R", "CC", row))
     return Artefact(folder / "pose.CC.h5")
 
 

@@ -129,7 +129,8 @@ def test_ctrl_c_says_how_to_go_on_and_the_same_command_does(finished, tmp_path):
     words = [*words[:3], str(tmp_path / "out"), "--cores", "2"]
     process = start(project, desk, *words)
     for _ in range(1200):
-        if (tmp_path / "out/a/segment.h5").exists():
+        # The next stage's log: Snakemake takes away what a job has written if it has not yet seen it end.
+        if (tmp_path / "out/logs/a/mesh.log").exists():
             break
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)

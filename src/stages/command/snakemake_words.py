@@ -1,6 +1,7 @@
 """Snakemake's messages in a user's words: no exception's name, no traceback, no list of files."""
 
 import re
+import textwrap
 
 _CHATTER = (
     "Config file ",
@@ -42,6 +43,12 @@ def plain(text: str) -> str:
     lines = [line for line in _EXCEPTION.sub("", text).splitlines() if not _FRAME.match(line)]
     no_target = r"there is no target \1; give a study such as table_1, or a file such as a case's localize.h5"
     return _NO_TARGET.sub(no_target, "\n".join(lines).strip())
+
+
+def mistake_within(text: str) -> str | None:
+    """The message of a mistake that Snakemake met while it asked for a rule's inputs; None if it was another error."""
+    found = re.search(r"InputFunctionException.*?^ +WorkflowError:\n(.*?)^Wildcards:", text, re.DOTALL | re.MULTILINE)
+    return textwrap.dedent(found.group(1)).strip() if found else None
 
 
 def killed_by(text: str) -> str | None:

@@ -32,10 +32,11 @@ def supervised(command: Sequence[str], environment: Mapping[str, str], started: 
     def note(number: int, frame: FrameType | None) -> None:
         requests.append(number)
 
-    # A group of its own: the terminal's Ctrl-C comes here alone, and from here to each process what suits it.
-    child = subprocess.Popen(command, env=dict(environment), process_group=0)
+    # Before the child starts: one that is started in the background ignores Ctrl-C, and so would its child.
     before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     try:
+        # A group of its own: the terminal's Ctrl-C comes here alone, and from here to each process what suits it.
+        child = subprocess.Popen(command, env=dict(environment), process_group=0)
         answered = 0
         while True:
             try:

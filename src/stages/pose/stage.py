@@ -66,7 +66,8 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     else:
         return without_image(mesh, subject)
     mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
-    tissue = dense_tissue(segment.labels, segment.breast_mask, mesh) if settings.use_density else None
+    dense = settings.use_density and not facts.seen.placed
+    tissue = dense_tissue(segment.labels, segment.breast_mask, mesh) if dense else None
     search = PoseSearch(settings.angle_step_deg, settings.angle_bound_deg, settings.angle_sd_deg)
     found = find_pose(facts.seen, mesh, settings.mechanics.numerics(), mu_kpa, tissue, search)
     return _fields(facts, mesh, segment.nipple, found)
