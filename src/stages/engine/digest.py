@@ -88,7 +88,6 @@ def _data_beside(folder: Path) -> dict[str, Path]:
     }
 
 
-@cache
 def _syntax(module: str, source: Path) -> str:
     tree = _parse(module, source)
     for node in ast.walk(tree):
