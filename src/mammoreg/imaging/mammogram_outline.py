@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, signal
+from scipy import ndimage
 from skimage import measure
 
 from mammoreg.arrays import Floats32
@@ -86,7 +86,7 @@ def _at_half_height(
 
     The contour's level lies near the air's, which blur carries outwards by its own width.
     """
-    tangent = np.gradient(signal.savgol_filter(contour, min(21, len(contour) // 2 * 2 - 1), 1, axis=0), axis=0)
+    tangent = np.gradient(_smoothed(contour, min(21, len(contour) // 2 * 2 - 1), 1), axis=0)
     outward = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
     outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
     steps = np.arange(-_INSIDE_MM, _INSIDE_MM, _REFINED_MM)
@@ -109,10 +109,16 @@ def _smooth_polyline(dense: NDArray[np.float64], pixel_mm: float) -> NDArray[np.
     if len(dense) <= window:
         raise DataError("the breast's edge against air in the mammogram is shorter than 5 mm; check the image")
     # A local cubic keeps the curvature that a Gaussian would flatten.
-    return _resampled(signal.savgol_filter(dense, window, 3, axis=0), _STEP_MM / pixel_mm)
+    return _resampled(_smoothed(dense, window, 3), _STEP_MM / pixel_mm)
 
 
 def _resampled(polyline: NDArray[np.float64], step: float) -> NDArray[np.float64]:
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
     at = np.linspace(0.0, length[-1], max(2, round(length[-1] / step) + 1))
     return np.stack([np.interp(at, length, polyline[:, axis]) for axis in range(2)], axis=1)
+
+
+def _smoothed(polyline: NDArray[np.float64], window: int, degree: int) -> NDArray[np.float64]:
+    from scipy.signal import savgol_filter  # takes a second to import
+
+    return np.asarray(savgol_filter(polyline, window, degree, axis=0))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage, signal
+from scipy import ndimage
 
 from mammoreg.arrays import Bools
 from mammoreg.errors import DataError
@@ -35,6 +35,8 @@ def find_breast(body: Bools, grid: Volume) -> BreastPlace:
     Raises:
         DataError: nothing protrudes by at least 15 mm, or only the other breast does.
     """
+    from scipy import signal  # takes a second to import
+
     relief = _relief(body, grid)
     profile = ndimage.gaussian_filter1d(np.sort(relief, axis=1)[:, -3:].mean(axis=1), 1.5)
     low = [profile.min()]

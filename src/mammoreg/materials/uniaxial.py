@@ -20,7 +20,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from mammoreg.arrays import Floats
 
@@ -97,6 +96,7 @@ class UniaxialLaw(ABC):
     @cached_property
     def exact_to(self) -> float:
         """Compression up to which the law is followed exactly."""
+        from scipy.optimize import brentq
 
         def reserve(compression: Floats) -> Floats:
             return self._shear_tangent(compression) - LEAST_SHEAR * self.mu_kpa

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import minimize
 
 from mammoreg.arrays import Floats, Integers
 from mammoreg.meshing.block import BlockMesh
@@ -49,6 +48,8 @@ def relax(mesh: BlockMesh, cell: Floats, squares: SquaredTerms, iterations: int)
         cell: edge lengths (3,) in mm of the ideal element along i, j, k.
         iterations: limit of the quasi-Newton method.
     """
+    from scipy.optimize import minimize
+
     hexes = mesh.hexes()
     gradients = shape_gradients(_NEAR_CORNERS) * (2.0 / cell)
     determinant = np.linalg.det(_scaled(mesh.points, hexes, cell))

@@ -11,7 +11,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.random import Generator
-from scipy.optimize import brentq
 
 from mammoreg.geometry import Volume, plate_to_breast
 from mammoreg.meshing.trilinear import volumes
@@ -83,6 +82,8 @@ def draw_each(ranges: dict[str, tuple[float, float]], random: Generator) -> dict
 
 def draw_shape(random: Generator) -> BreastShape:
     """A breast of a drawn volume on its torso."""
+    from scipy.optimize import brentq
+
     volume, torso, shape = float(random.uniform(*VOLUME_CM3)), draw_each(TORSO, random), draw_each(SHAPE, random)
     breast = BreastShape(torso=Torso(front_p=0.0, **torso), **shape)
 

@@ -9,7 +9,6 @@ from stages.formats.findings import FINDINGS
 from stages.formats.pages import Section, as_csv, as_html, as_markdown, cells, section_of
 from stages.formats.table import Row, Table
 from stages.tables.findings import cohort_findings
-from stages.tables.netcdf import cohort_netcdf
 from stages.tables.record import FAILURES, LANDMARKS, TABLE_5, TABLE_6, TABLES, tables_fields
 from stages.tables.statistics import Group, groups, incomplete, readable_rows, statistics_rows
 
@@ -18,6 +17,10 @@ _INPUTS = ("segment", "mesh", "pose", "compress", "shape", "solve", "project", "
 
 def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     """Write every table, with or without truth; cases that failed are named first."""
+    from stages.tables.netcdf import (
+        cohort_netcdf,
+    )  # not for those who only want this stage's settings: xarray is slow to import
+
     artefacts = [artefact for name in _INPUTS for artefact in inputs.artefacts(name)]
     rows_of = {table.name: table.rows(artefacts) for table in TABLES}
     found = groups(*(rows_of[table.name] for table in (TABLE_5, TABLE_6, LANDMARKS)))

@@ -1,11 +1,14 @@
 """Trilinear hexahedra: gradients and quadrature weights of the undeformed mesh, by scikit-fem."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import skfem
 
 from mammoreg.arrays import Floats, Integers
+
+if TYPE_CHECKING:
+    import skfem
 
 VTK_IN_SKFEM = [0, 4, 3, 1, 7, 5, 2, 6]
 """scikit-fem's corner c is corner VTK_IN_SKFEM[c] of the VTK order."""
@@ -26,8 +29,10 @@ class Hexahedra:
     volume: Floats
 
 
-def skfem_basis(points: Floats, hexes: Integers) -> skfem.Basis:
+def skfem_basis(points: Floats, hexes: Integers) -> "skfem.Basis":
     """scikit-fem's basis of trilinear hexahedra (corners in VTK order) with 2 x 2 x 2 Gauss points."""
+    import skfem  # when it is needed: settings are read without it
+
     mesh = skfem.MeshHex(np.ascontiguousarray(points.T), np.ascontiguousarray(hexes[:, VTK_IN_SKFEM].T))
     return skfem.Basis(mesh, skfem.ElementHex1(), intorder=3)
 

@@ -1,6 +1,7 @@
 """Sparse direct solver with a pattern that is analysed once: MKL PARDISO, or SuperLU where MKL is missing."""
 
 import ctypes
+import functools
 import weakref
 from typing import Any
 
@@ -12,15 +13,20 @@ from scipy.sparse.linalg import splu
 from mammoreg.arrays import Floats
 from mammoreg.errors import NotConvergedError
 
-try:
-    import pypardiso
-except ImportError:  # the wrapper, or the MKL library that it looks for, is not installed
-    pypardiso = None
-
 Indices = NDArray[np.int32]
 
 _UNSYMMETRIC, _SYMMETRIC_INDEFINITE = 11, -2
 _ANALYSE, _FACTORISE, _SOLVE, _RELEASE = 11, 22, 33, -1
+
+
+@functools.cache
+def mkl() -> Any:
+    """The MKL library that PyPardiso found, or None; looked for when first needed, for it takes a second."""
+    try:
+        import pypardiso
+    except ImportError:  # the wrapper, or the MKL library that it looks for, is not installed
+        return None
+    return pypardiso.ps.libmkl
 
 
 class PardisoSolver:
@@ -93,7 +99,7 @@ def _pardiso(
 ) -> int:
     """One call of MKL's pardiso; its error code."""
     error, unused = ctypes.c_int32(0), np.zeros(1, dtype=np.int32)
-    pypardiso.ps.libmkl.pardiso(
+    mkl().pardiso(
         _pointer(handle, ctypes.c_int64), _integer(1), _integer(1), _integer(kind), _integer(phase), _integer(size),
         _pointer(values, ctypes.c_double), _pointer(indptr, ctypes.c_int32), _pointer(indices, ctypes.c_int32),
         _pointer(unused, ctypes.c_int32), _integer(1), _pointer(iparm, ctypes.c_int32), _integer(0),
@@ -144,7 +150,7 @@ def _refuse_infinite(*arrays: Floats) -> None:
 
 def linear_solver(indptr: Indices, indices: Indices, symmetric: bool) -> PardisoSolver | SuperLuSolver:
     """The fastest solver at hand for a pattern."""
-    kind: Any = PardisoSolver if pypardiso is not None else SuperLuSolver
+    kind: Any = PardisoSolver if mkl() is not None else SuperLuSolver
     solver: PardisoSolver | SuperLuSolver = kind(indptr, indices, symmetric)
     return solver
 
