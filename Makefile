@@ -19,7 +19,7 @@ run: .venv/runtime
 	$(BIN)/mammoreg run --cores $(CORES)
 
 test: .venv/development
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 verify: .venv/development
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "slow or not slow" tests/verification
