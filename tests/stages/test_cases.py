@@ -98,7 +98,11 @@ def test_names_that_the_results_folder_uses(tmp_path, name):
             "mr_compressed_landmarks is given without mr_compressed; give mr_compressed as well",
         ),
         ([CASE], [VIEW, VIEW], "views.tsv row 3: c1 CC is already in row 2; keep one of the rows, or exclude one view"),
-        ([CASE], [VIEW | {"view": "LM"}], "column view: 'LM' is not permitted: Input should be 'CC' or 'MLO'"),
+        ([CASE], [VIEW | {"view": "X"}], "column view: 'X' is not permitted: no such view; known are CC, MLO, ML, LM,"),
+        ([CASE], [VIEW | {"view": "MCC"}], "column view: 'MCC' is not permitted: a magnification view cannot be"),
+        ([CASE], [VIEW | {"view": "SPOT"}], "column view: 'SPOT' is not permitted: a spot compression view cannot be"),
+        ([CASE], [VIEW | {"angle_deg": "nan"}], "column angle_deg: 'nan' is not permitted"),
+        ([CASE], [VIEW | {"thickness_mm": "72,0"}], "column thickness_mm: '72,0' is not permitted"),
         (
             [CASE],
             [VIEW | {"case": "c9"}],

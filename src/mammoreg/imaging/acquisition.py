@@ -1,6 +1,5 @@
 """A mammogram as pixels, and how it was taken."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,11 +8,10 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry
-from mammoreg.imaging.mammogram_orientation import View
+from mammoreg.imaging.views import PROJECTIONS, View
 
 DEFAULT_SOURCE_DETECTOR_MM = 650.0
 DEFAULT_SUPPORT_DETECTOR_MM = 15.0
-DEFAULT_ANGLE_DEG: Mapping[View, float] = {"CC": 0.0, "MLO": 45.0}
 """Of a usual unit, where nothing tells its own."""
 
 
@@ -23,12 +21,12 @@ class Mammogram:
 
     Attributes:
         pixels: as stored, (rows, columns), neither flipped nor inverted.
-        view: CC or MLO.
+        view: one of `mammoreg.imaging.views.VIEWS`.
         pixel_mm: pixel spacing at the detector, mm.
         thickness_mm: distance of the plates, mm; None: estimated from the outline.
         angle_deg: projection angle a, degrees, CC a signed roll, MLO positive: in LPS the source lies along
-            (-s sin a, 0, cos a) from the breast, with s = +1 for a left and -1 for a right one. None: 0 and 45. It is
-            where the search for the true angle starts.
+            (-s sin a, 0, cos a) from the breast, with s = +1 for a left and -1 for a right one. None: the view's usual
+            one (CC 0, MLO 45, ML 90, LM -90, LMO -135, FB 180). It is where the search for the true angle starts.
         source_detector_mm, support_detector_mm: height of source and support surface above the detector, mm.
         orientation: row and column direction as stored (PatientOrientation), such as ``A\R`` or ``P\FL``; None: by the
             side on which the image shows air.
@@ -50,8 +48,8 @@ class Mammogram:
     def __post_init__(self) -> None:
         if np.ndim(self.pixels) != 2:
             raise DataError(f"a mammogram is an array of rows and columns, not of shape {np.shape(self.pixels)}")
-        if self.view not in DEFAULT_ANGLE_DEG:
-            raise DataError(f"view {self.view!r} is not known; it is one of {', '.join(DEFAULT_ANGLE_DEG)}")
+        if self.view not in PROJECTIONS:
+            raise DataError(f"view {self.view!r} is not known; it is one of {', '.join(PROJECTIONS)}")
         for name in ("pixel_mm", "thickness_mm"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:
@@ -61,7 +59,7 @@ class Mammogram:
         """What is known of the view's geometry before the breast is found in it: edge, middle and height are not."""
         rows, columns = self.pixels.shape
         return ViewGeometry(
-            angle_deg=DEFAULT_ANGLE_DEG[self.view] if self.angle_deg is None else self.angle_deg,
+            angle_deg=PROJECTIONS[self.view].angle_deg if self.angle_deg is None else self.angle_deg,
             edge_p_mm=0.0,
             middle_mm=0.0,
             height_mm=0.0,

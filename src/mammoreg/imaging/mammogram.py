@@ -10,9 +10,9 @@ from mammoreg.arrays import Floats32
 from mammoreg.imaging.mammogram_air import find_air
 from mammoreg.imaging.mammogram_breast import breast_mask, edge_level, smoothed
 from mammoreg.imaging.mammogram_nipple import nipple_in_outline
-from mammoreg.imaging.mammogram_orientation import View
 from mammoreg.imaging.mammogram_outline import outline_polyline, outline_weight
 from mammoreg.imaging.mammogram_pectoral import pectoral_mask
+from mammoreg.imaging.views import PROJECTIONS, View
 
 _WORKING_PIXEL_MM = 0.2
 
@@ -37,7 +37,7 @@ class MammogramAnalysis:
 
 
 def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnalysis:
-    """Find breast, outline, pectoral muscle (MLO) and nipple in a canonical mammogram.
+    """Find breast, outline, pectoral muscle (oblique and lateral views) and nipple in a canonical mammogram.
 
     Args:
         pixels: canonical image (rows, columns), bright = dense (`canonicalise`).
@@ -54,7 +54,7 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
     level = edge_level(smooth, air)
     mask = breast_mask(smooth, level, spacing)
     outline = outline_polyline(smooth, mask, level, air, spacing)
-    pectoral = pectoral_mask(image, mask, spacing) if view == "MLO" else None
+    pectoral = _pectoral(image, mask, spacing, view)
     weight = outline_weight(outline, mask, pectoral, spacing)
     nipple = nipple_in_outline(outline, weight, spacing)
     return MammogramAnalysis(
@@ -64,6 +64,15 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
         pectoral=None if pectoral is None else _enlarged(pectoral, factor, pixels.shape),
         nipple=None if nipple is None else _to_full(nipple, factor),
     )
+
+
+def _pectoral(image: Floats32, mask: NDArray[np.bool_], spacing: float, view: View) -> NDArray[np.bool_] | None:
+    """The muscle in a view that may show it; it is sought in the first rows, which are superior then."""
+    if not PROJECTIONS[view].shows_pectoral:
+        return None
+    order = slice(None, None, 1 if PROJECTIONS[view].hung_as_canonical else -1)
+    found = pectoral_mask(image[order], mask[order], spacing)
+    return None if found is None else np.ascontiguousarray(found[order])
 
 
 def _reduced(image: Floats32, factor: int) -> Floats32:

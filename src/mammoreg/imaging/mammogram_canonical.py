@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mammogram_air import Air, find_air
-from mammoreg.imaging.mammogram_orientation import Flips, View, flips_of_orientation
+from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation
+from mammoreg.imaging.views import View
 
 
 @dataclass(frozen=True)

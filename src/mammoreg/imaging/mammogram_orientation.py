@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-
-View = Literal["CC", "MLO"]
+from mammoreg.imaging.views import PROJECTIONS, View
 
 _OPPOSITE = {"A": "P", "P": "A", "L": "R", "R": "L", "F": "H", "H": "F"}
 
@@ -18,8 +17,9 @@ _OPPOSITE = {"A": "P", "P": "A", "L": "R", "R": "L", "F": "H", "H": "F"}
 class Flips:
     """Which axes of the stored image are reversed to make it canonical.
 
-    Canonical: column 0 at the chest wall, columns towards the nipple, rows towards medial along the plate (and, in an
-    MLO view, towards the feet). Flips commute and undo themselves, so the same object maps both ways.
+    Canonical: column 0 at the chest wall, columns towards the nipple, rows along the plate frame's first axis: towards
+    medial in CC, medial and the feet in MLO, the feet in ML, the head in LM, the head and lateral in LMO, lateral in
+    FB. Flips commute and undo themselves, so the same object maps both ways.
     """
 
     rows: bool
@@ -48,7 +48,8 @@ class Flips:
 def flips_of_orientation(orientation: str, laterality: Laterality, view: View) -> Flips:
     r"""Decide the flips from PatientOrientation, side and view.
 
-    Usual values are ``A\R`` (left CC), ``P\L`` (right CC), ``A\FR`` (left MLO) and ``P\FL`` (right MLO).
+    Usual values are ``A\R`` (left CC), ``P\L`` (right CC), ``A\FR`` (left MLO), ``P\FL`` (right MLO), ``A\F`` (left
+    ML and LM) and ``P\F`` (right ones).
 
     Args:
         orientation: row direction and column direction as stored, such as ``A\FR``; one letter of each is enough.
@@ -82,8 +83,8 @@ def _is_direction(letters: str) -> bool:
 
 
 def _rows_run_backwards(letters: str, orientation: str, laterality: Laterality, view: View) -> bool:
-    medial = "R" if laterality == "L" else "L"
-    forwards = {medial} | ({"F"} if view == "MLO" else set())
+    across = {"M": "R", "T": "L"} if laterality == "L" else {"M": "L", "T": "R"}
+    forwards = {across.get(letter, letter) for letter in PROJECTIONS[view].rows_towards}
     backwards = {_OPPOSITE[letter] for letter in forwards}
     towards, away = set(letters) & forwards, set(letters) & backwards
     if bool(towards) == bool(away):

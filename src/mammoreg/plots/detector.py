@@ -9,13 +9,14 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from mammoreg.arrays import Bools
+from mammoreg.imaging.views import projection_of
 from mammoreg.localization.lesions import LesionArea
 from mammoreg.plots.style import add_corner_label, add_scale_bar, grey_window, halo
 
 
 @dataclass(frozen=True)
 class DetectorImage:
-    """A canonical image (column 0 at the chest wall, rows towards medial), perhaps thinned to blocks of pixels.
+    """A canonical image (column 0 at the chest wall), perhaps thinned to blocks of pixels.
 
     Attributes:
         pixels: one value per block (ceil(rows / step), columns / step).
@@ -62,8 +63,11 @@ def show_detector_image(axes: Axes, image: DetectorImage, laterality: str, view:
     axes.set_ylabel("along chest wall (mm)")
     axes.set_facecolor("black")
     add_corner_label(axes, f"{laterality} {view}", "upper left" if laterality == "R" else "upper right")
-    add_corner_label(axes, "superior" if view == "MLO" else "lateral", "top")
-    add_corner_label(axes, "inferior" if view == "MLO" else "medial", "bottom")
+    projection = projection_of(view)
+    if not projection.hung_as_canonical:
+        axes.invert_yaxis()
+    add_corner_label(axes, "superior" if projection.upright else "lateral", "top")
+    add_corner_label(axes, "inferior" if projection.upright else "medial", "bottom")
     add_scale_bar(axes)
 
 

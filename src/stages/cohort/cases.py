@@ -9,11 +9,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
-from mammoreg.imaging.mammogram_orientation import View
+from mammoreg.imaging.views import View
+from stages.cohort.readers.view_codes import registrable_view
 from stages.engine.errors import Fault, FaultsError
-from stages.views import SECOND_VOLUME
+from stages.views import SECOND_VOLUME, view_order
 
 RESERVED = ("tables", "figures", "benchmarks", "logs", "digital")
 PICTURES = (".png", ".tif", ".tiff")
@@ -28,6 +29,7 @@ def _not_reserved(name: str) -> str:
 CaseId = Annotated[
     str, Field(pattern=r"^[A-Za-z0-9_-]+$", description="unique id of the breast"), AfterValidator(_not_reserved)
 ]
+ViewName = Annotated[View, BeforeValidator(registrable_view)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _EXCLUDE = Field(None, description="a reason; the row is kept, not run, and the report says why")
 
@@ -62,7 +64,11 @@ class CaseRow(Row):
     mr_surface_points: Path | None = Field(None, description=".tsv with points of the skin before compression")
     mr_compressed_surface_points: Path | None = Field(None, description=".tsv with the same points between the plates")
     compression: float | None = Field(
-        None, gt=0, lt=0.9, description="share of the uncompressed thickness that the plates take away, such as 0.21"
+        None,
+        gt=0,
+        lt=0.9,
+        allow_inf_nan=False,
+        description="share of the uncompressed thickness that the plates take away, such as 0.21",
     )
     exclude: str | None = _EXCLUDE
 
@@ -75,7 +81,7 @@ class ViewRow(Row):
     """One mammogram."""
 
     case: CaseId
-    view: View = Field(description="projection")
+    view: ViewName = Field(description="projection")
     image: Path = Field(description="DICOM mammogram, or .png/.tif with pixel_spacing_mm")
     lesion: Path | None = Field(
         None, description=".png mask of the image's size, or .tsv with name, column, row, diameter_mm"
@@ -84,7 +90,7 @@ class ViewRow(Row):
     pixel_spacing_mm: Positive | None = Field(None, description="pixel spacing at the detector, mm")
     thickness_mm: Positive | None = Field(None, description="distance of the plates, mm")
     force_n: Positive | None = Field(None, description="plate force, N")
-    angle_deg: float | None = Field(None, ge=-90, le=90, description="projection angle, degree")
+    angle_deg: float | None = Field(None, ge=-180, le=270, allow_inf_nan=False, description="projection angle, degree")
     source_detector_mm: Positive | None = Field(None, description="source-to-detector distance, mm")
     orientation: str | None = Field(
         None,
@@ -129,7 +135,7 @@ class Cohort:
 
     def views(self, case: str) -> list[str]:
         """Views of a case: its mammograms, else 3D where a second volume or `compression` tells of plates."""
-        found = sorted(view for name, view in self.mammograms if name == case)
+        found = sorted((view for name, view in self.mammograms if name == case), key=view_order)
         row = self.cases[case]
         return found or ([SECOND_VOLUME] if row.mr_compressed or row.compression else [])
 

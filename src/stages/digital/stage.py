@@ -7,7 +7,6 @@ from pydantic import Field
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, breast_to_plate
-from mammoreg.imaging.mammogram_orientation import View as Mammogram
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.mammogram import Exposure, Pectoral, presented, project
 from mammoreg.phantom.mri import T1, T1_FAT_SUPPRESSED, Acquisition, acquire
@@ -17,12 +16,13 @@ from mammoreg.phantom.skin_points import skin_points
 from mammoreg.phantom.warp import Deformed
 from stages.digital.dicom import mammogram_dicom, mr_dicom, nifti, points_tsv, stored_mask
 from stages.engine.contract import Array, Fields, Inputs, SettingsModel, Stage, Subject, Value
-from stages.views import IMAGED, SECOND_VOLUME
+from stages.views import SECOND_VOLUME
 
 MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1300, 900
 SOURCE_DETECTOR_MM, SUPPORT_DETECTOR_MM = 650.0, 15.0
 OFF_CENTRE_MM, BEHIND_EDGE_MM = 8.0, 12.0
 HEADER_THICKNESS_OFF_MM = 2.0
+MAMMOGRAMS: tuple[View, ...] = ("CC", "MLO")
 LANDMARKS, VOLUNTEER_LANDMARKS, SURFACE_POINTS = 30, 17, 16
 EXPOSURE = Exposure(photons=4.0e4, scatter=0.35, scatter_mm=10.0, blur_mm=0.15, equalisation=0.6)
 NOISE, FAT_SUPPRESSED_NOISE, BIAS = 22.0, 14.0, 0.5
@@ -41,7 +41,7 @@ class DigitalPatient(SettingsModel):
         "nifti", description="Form of the MR volume: NIfTI, NIfTI of sagittal planes, or a folder with a DICOM series."
     )
     monochrome1: bool = Field(False, description="Whether the mammograms are stored inverted (MONOCHROME1).")
-    unseen_views: tuple[Mammogram, ...] = Field((), description="Views without a visible lesion.")
+    unseen_views: tuple[Literal["CC", "MLO"], ...] = Field((), description="Views without a visible lesion.")
 
 
 class Settings(SettingsModel):
@@ -70,7 +70,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         return Making(
             subject, chosen, Patient.draw(chosen.seed, (SECOND_VOLUME,), True, VOLUNTEER_LANDMARKS)
         ).volunteer()
-    return Making(subject, chosen, Patient.draw(chosen.seed, IMAGED, False, LANDMARKS)).clinical()
+    return Making(subject, chosen, Patient.draw(chosen.seed, MAMMOGRAMS, False, LANDMARKS)).clinical()
 
 
 def mr_files(volume: Volume, chosen: DigitalPatient, subject: Subject) -> dict[str, bytes]:

@@ -23,7 +23,7 @@ from stages.localize.record import Predictions
 from stages.mesh.record import MeshRecord
 from stages.methods import METHODS, method_views, of_view
 from stages.pose.record import PoseRecord
-from stages.views import IMAGED
+from stages.views import IMAGED, view_order
 
 _PER_VIEW = ("pose", "compress", "shape", "solve", "project")
 
@@ -129,7 +129,7 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
     fits: list[Row] = []
     elongations: list[Row] = []
     poses = (PoseRecord(artefact) for artefact in inputs.artefacts("pose") if artefact.ok)
-    for pose in sorted(poses, key=lambda pose: pose.view):
+    for pose in sorted(poses, key=lambda pose: view_order(pose.view)):
         methods = method_views(pose, mesh.reference, results)
         fits += fit_rows(pose, mesh.block, methods, results, gaps, limits)
         elongations += elongation_rows(pose, mesh.block, methods)

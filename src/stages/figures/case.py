@@ -19,7 +19,7 @@ from stages.methods import METHODS, method_views
 from stages.pose.record import PoseRecord
 from stages.project.record import ProjectRecord
 from stages.segment.record import SegmentRecord
-from stages.views import IMAGED
+from stages.views import IMAGED, view_order
 
 BEST_FIRST = tuple(reversed(METHODS))
 
@@ -72,7 +72,7 @@ class PicturedCase:
     def poses(self) -> dict[str, PoseRecord]:
         """Poses that ended well, by view, CC first."""
         found = [PoseRecord(pose) for pose in self.inputs.artefacts("pose") if pose.ok]
-        return {pose.view: pose for pose in sorted(found, key=lambda pose: pose.view)}
+        return {pose.view: pose for pose in sorted(found, key=lambda pose: view_order(pose.view))}
 
     @cached_property
     def imaged(self) -> dict[str, PoseRecord]:

@@ -7,7 +7,7 @@ from mammoreg.localization.deformation import MethodView, ReferenceMesh
 from stages.engine.artefact import Artefact
 from stages.methods import MESH_METHODS, METHODS, method_views
 from stages.pose.record import PoseRecord
-from stages.views import IMAGED
+from stages.views import IMAGED, view_order
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def case_views(poses: Sequence[Artefact], solutions: Sequence[Artefact], referen
         solutions: artefacts of `compress` and `solve`, failed ones too.
         reference: the undeformed mesh.
     """
-    ordered = sorted(poses, key=lambda pose: str(pose.view))
+    ordered = sorted(poses, key=lambda pose: view_order(str(pose.view)))
     well = {str(pose.view): PoseRecord(pose) for pose in ordered if pose.ok}
     methods = {view: method_views(pose, reference, solutions) for view, pose in well.items()}
     troubles = {(str(pose.view), method): pose.message for pose in ordered if not pose.ok for method in METHODS}

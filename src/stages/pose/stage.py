@@ -60,7 +60,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     segment, mesh = SegmentRecord(inputs.artefact("segment")), MeshRecord(inputs.artefact("mesh")).block
     image, second = inputs.path("image"), segment.compressed_mask
     if image is not None:
-        facts = facts_of_mammogram(image, subject, "MLO" if subject.view == "MLO" else "CC")
+        facts = facts_of_mammogram(image, subject)
     elif second is not None:
         facts = facts_of_second_volume(second)
     else:

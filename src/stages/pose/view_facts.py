@@ -11,7 +11,7 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.acquisition import Mammogram
 from mammoreg.imaging.mammogram import MammogramAnalysis
-from mammoreg.imaging.mammogram_orientation import View
+from mammoreg.imaging.views import VIEWS
 from mammoreg.pose.outlined import OUTLINE_RAYS, OutlinedView, outlined_mammogram
 from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
@@ -45,12 +45,13 @@ class ViewFacts:
     values: dict[str, Value] = field(default_factory=dict)
 
 
-def facts_of_mammogram(path: Path, subject: Subject, view: View) -> ViewFacts:
+def facts_of_mammogram(path: Path, subject: Subject) -> ViewFacts:
     """Read and analyse a mammogram.
 
     Raises:
         DataError: the image cannot be used, or its pixel spacing is unknown.
     """
+    view = next(name for name in VIEWS if name == subject.view)
     stored = read_mammogram(path, subject.row, subject.laterality, view)
     facts = stored.facts
     if facts.pixel_mm is None:

@@ -14,7 +14,7 @@ from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
 from stages.localize.record import Predictions
 from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
-from stages.views import SECOND_VOLUME
+from stages.views import SECOND_VOLUME, view_order
 
 SHOWN_METHOD = "updated"
 SIDES = {"L": "left", "R": "right"}
@@ -57,7 +57,7 @@ def case_page(name: str, laterality: str, artefacts: Sequence[Artefact]) -> Case
     return CasePage(
         name,
         SIDES[laterality],
-        sorted({str(a.view) for a in artefacts if a.view}),
+        sorted({str(a.view) for a in artefacts if a.view}, key=view_order),
         next((str(failure.status) for failure in failures), "ok").replace("_", " "),
         [f"{failure.view}: {failure}" if failure.view else str(failure) for failure in failures],
         _warnings(artefacts),

@@ -14,7 +14,7 @@ from pydicom.errors import InvalidDicomError
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-from mammoreg.imaging.mammogram_orientation import View
+from mammoreg.imaging.views import View
 from stages.cohort.readers.mammogram_header import MammogramFacts, mammogram_facts
 
 PICTURES = (".png", ".tif", ".tiff")
