@@ -18,6 +18,7 @@ from mammoreg.geometry import Volume
 from mammoreg.geometry.frames import Frame
 from stages.engine.errors import ArtefactError
 from stages.engine.failures import Failure, Status
+from stages.engine.text import json_value
 from stages.engine.writing import write_bytes
 
 Value = None | bool | int | float | str | list[Any] | dict[str, Any]
@@ -225,7 +226,7 @@ def _image(attrs: Mapping[str, str], fields: Fields) -> bytes:
         for name, volume in fields.volumes.items():
             _write_volume(volumes, name, volume)
         for name, value in fields.values.items():
-            values.create_dataset(name, data=_fixed(json.dumps(_plain(value), allow_nan=False, ensure_ascii=False)))
+            values.create_dataset(name, data=_fixed(json.dumps(json_value(value), allow_nan=False, ensure_ascii=False)))
         file.flush()
         return cast(bytes, file.id.get_file_image())
 
@@ -272,19 +273,6 @@ def _storable(data: NDArray[Any]) -> NDArray[Any]:
     if array.dtype.kind not in "iuf":
         raise TypeError(f"an artefact's arrays are numbers, not {array.dtype}; texts belong in values")
     return array
-
-
-def _plain(value: Any) -> Any:
-    """JSON types for NumPy scalars and arrays; a number that is not finite becomes null."""
-    if isinstance(value, np.ndarray | np.generic):
-        value = value.tolist()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
 
 
 def _fixed(text: str) -> NDArray[Any]:

@@ -1,11 +1,26 @@
-"""Values as a person reads them: rounded numbers, lists of rows as tables."""
+"""Values as an artefact keeps them, JSON, and as a person reads them: rounded numbers, lists of rows as tables."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 LONGEST = 100
 _MOST_ROWS = 60
+
+
+def json_value(value: Any) -> Any:
+    """JSON types for NumPy scalars and arrays; a number that is not finite becomes null."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    if isinstance(value, Mapping):
+        return {str(key): json_value(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [json_value(item) for item in value]
+    return value
 
 
 def value_lines(values: Mapping[str, Any]) -> Iterator[str]:
