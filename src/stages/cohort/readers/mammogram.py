@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from PIL import Image
 from pydicom import dcmread
 from pydicom.dataset import Dataset
-from pydicom.errors import InvalidDicomError
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.views import View
 from stages.cohort.readers.mammogram_header import MammogramFacts, mammogram_facts
+from stages.cohort.readers.mammogram_kind import lift_frame_values, other_kind
+from stages.cohort.readers.outside import with_air_outside
 
 PICTURES = (".png", ".tif", ".tiff")
 
@@ -47,7 +48,7 @@ def read_mammogram(path: Path, row: Mapping[str, str], laterality: Laterality, v
         return StoredMammogram(_picture_pixels(path), mammogram_facts(path, Dataset(), row, laterality, view))
     header = _read_dicom(path, pixels=True)
     facts = mammogram_facts(path, header, row, laterality, view)
-    return StoredMammogram(_dicom_pixels(path, header), facts)
+    return StoredMammogram(_dicom_pixels(path, header, facts.linear), facts)
 
 
 def read_mammogram_facts(path: Path, row: Mapping[str, str], laterality: Laterality, view: View) -> MammogramFacts:
@@ -68,24 +69,22 @@ def is_picture(path: Path) -> bool:
 def _read_dicom(path: Path, *, pixels: bool) -> Dataset:
     try:
         header = dcmread(path, stop_before_pixels=not pixels)
-    except (OSError, InvalidDicomError, EOFError, ValueError) as error:
+        lift_frame_values(header)
+    except Exception as error:  # pydicom raises many kinds for a damaged file
         raise DataError(f"{path}: cannot be read as DICOM; name a DICOM mammogram, a .png or a .tif") from error
-    modality = str(header.get("Modality", "")).strip()
-    if modality != "MG":
-        raise DataError(f"{path}: modality is {modality or 'missing'}, not MG; name a mammogram")
-    if int(header.get("NumberOfFrames") or 1) > 1:
-        raise DataError(f"{path}: holds several frames; name a plain mammogram, not a tomosynthesis")
+    if found := other_kind(header):
+        raise DataError(f"{path}: {found}")
     return header
 
 
-def _dicom_pixels(path: Path, header: Dataset) -> NDArray[np.float32]:
+def _dicom_pixels(path: Path, header: Dataset, linear: bool) -> NDArray[np.float32]:
     try:
         pixels = np.asarray(header.pixel_array)
     except (NotImplementedError, RuntimeError):
         pixels = _decoded_by_itk(path)
-    except (AttributeError, ValueError, EOFError) as error:
+    except Exception as error:  # as above
         raise DataError(f"{path}: pixels are missing or truncated; export the image again") from error
-    return _without_padding(_one_channel(path, pixels), header)
+    return with_air_outside(_one_channel(path, pixels), header, linear)
 
 
 def _decoded_by_itk(path: Path) -> NDArray[Any]:
@@ -116,16 +115,3 @@ def _one_channel(path: Path, pixels: NDArray[Any]) -> NDArray[np.float32]:
     if pixels.ndim != 2:
         raise DataError(f"{path}: pixels of shape {pixels.shape} are no single image; export one mammogram a file")
     return pixels.astype(np.float32)
-
-
-def _without_padding(pixels: NDArray[np.float32], header: Dataset) -> NDArray[np.float32]:
-    """Padding pixels, which are no measurement, take the air's place: the nearest value that a pixel has."""
-    padding = header.get("PixelPaddingValue")
-    if padding is None:
-        return pixels
-    padded = pixels == float(padding)
-    if not padded.any() or padded.all():
-        return pixels
-    others = pixels[~padded]
-    nearest = others.min() if abs(others.min() - padding) < abs(others.max() - padding) else others.max()
-    return np.where(padded, nearest, pixels).astype(np.float32)

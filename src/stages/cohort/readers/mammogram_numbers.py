@@ -17,7 +17,6 @@ PIXEL_MM = (0.01, 1.0)
 LARGEST_SUPPORT_DETECTOR_MM = 60.0
 LARGEST_FORCE_N = 300.0
 """No unit presses with more."""
-LEAST_FORCE_N = 20.0
 _UNITS = (("cm", 10.0), ("m", 1000.0))
 _SPACINGS = ("ImagerPixelSpacing", "NominalScannedPixelSpacing", "PixelSpacing")
 _QUOTED = 24
@@ -75,7 +74,7 @@ class Numbers:
             # One vendor writes tenths of a newton.
             self.flags.append(f"CompressionForce {force:g} read as dN")
             return force / 10.0
-        if not LEAST_FORCE_N <= force <= LARGEST_FORCE_N:
+        if force > LARGEST_FORCE_N:
             self.flags.append(f"CompressionForce {force:g} N is no force of a mammography unit")
         return force
 
