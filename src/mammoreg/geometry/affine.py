@@ -4,7 +4,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from mammoreg.geometry.volume import Volume
 
@@ -53,5 +52,7 @@ def _resampled(
     shape = tuple(int(n) + 1 for n in np.ceil((corners.max(axis=1) - origin) / spacing))
     inverse = np.linalg.inv(affine[:3, :3])
     offset = inverse @ (origin - affine[:3, 3])
+    from scipy import ndimage  # when it is needed: it takes half a second to import
+
     found = ndimage.affine_transform(data, inverse * spacing, offset=offset.tolist(), output_shape=shape, order=order)
     return Volume(np.asarray(found), origin, spacing, "LPS")

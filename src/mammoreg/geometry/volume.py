@@ -5,7 +5,6 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from mammoreg.arrays import Points
 from mammoreg.geometry.frames import Frame, Laterality
@@ -53,6 +52,8 @@ class Volume:
     def sample(self, points: Points, order: Literal[0, 1] = 1, outside: float = 0.0) -> NDArray[np.float64]:
         """Interpolate at points (..., 3) in mm; `order` 0 is nearest, 1 is linear; `outside` fills beyond the grid."""
         index = np.moveaxis(self.to_index(points), -1, 0)
+        from scipy import ndimage  # when it is needed: it takes half a second to import
+
         values = ndimage.map_coordinates(
             self.data.astype(np.float32, copy=False), index, order=order, mode="constant", cval=outside, prefilter=False
         )
