@@ -78,18 +78,23 @@ def test_mr_folder_of_another_modality(folder):
     (folder / "series").mkdir()
     write_dicom(folder / "series" / "IM1")
     _with_mr(folder, "series")
-    _assert_only(folder, "column mr: ", "modality is MG, not MR; name the folder of one MR series")
+    _assert_only(folder, "column mr: ", "modality is MG, not MR; name the folder of an MR series, or of the patient")
 
 
 def test_mr_folder_without_dicom(folder):
     (folder / "series").mkdir()
     _with_mr(folder, "series")
-    _assert_only(folder, "column mr: ", "holds no DICOM image; name the folder of one MR series")
+    _assert_only(folder, "column mr: ", "holds no DICOM image; name the folder of an MR series, or of the patient")
 
 
 def test_mr_that_is_a_mammogram(folder):
     _with_mr(folder, "cc.dcm")
-    _assert_only(folder, "is neither NIfTI nor a folder; give .nii, .nii.gz or the folder of one DICOM series")
+    _assert_only(folder, "column mr: ", "modality is MG, not MR; name the folder of an MR series, or of the patient")
+
+
+def test_mr_that_is_a_table(folder):
+    _with_mr(folder, "points.tsv")
+    _assert_only(folder, "is neither NIfTI nor DICOM; give .nii, .nii.gz or the folder of an MR series")
 
 
 def _with_mr(folder, name):

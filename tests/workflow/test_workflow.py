@@ -31,10 +31,10 @@ def _jobs(output: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
-    """A project and a cohort of two cases that ran to its end, in folders with spaces in their names."""
+    """A project and a cohort of two cases that ran to its end, in folders with spaces and braces in their names."""
     folder = tmp_path_factory.mktemp("workflow")
     project = make_project(folder / "the project")
-    cohort = make_cohort(folder / "the data", ("a", "b"))
+    cohort = make_cohort(folder / "the {data}", ("a", "b"))
     done = snakemake(project, *_keys(cohort))
     assert done.returncode == 0, done.stdout
     return project, cohort, done

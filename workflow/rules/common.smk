@@ -8,6 +8,7 @@ from stages.cohort.cases import read_cohort
 from stages.engine.config import read_config, stage_settings
 from stages.engine.errors import FaultsError, UserError
 from stages.cohort.preflight import check_cohort
+from stages.cohort.tracked import is_indirect, tracked_files
 from stages.engine.registry import (
     CASE_STAGES,
     COHORT_STAGES,
@@ -32,10 +33,16 @@ def checked(function, *arguments):
 
 CONFIG = checked(read_config, config)
 RESULTS = Path(CONFIG.results)
+if set("{}") & set(str(RESULTS)):
+    raise WorkflowError(
+        f"results: {RESULTS}: braces are patterns to Snakemake; name a folder without them"
+    )
 # Where the embedded cohort's files are made; a user's tables say for themselves where theirs lie.
 DIGITAL = RESULTS / "digital" if CONFIG.cases is None else None
 COHORT = checked(read_cohort, *CONFIG.table_files(PROJECT), DIGITAL)
 config["case_count"] = len(COHORT.cases)
+# Links to files whose names Snakemake would take for patterns.
+LINKS = RESULTS / ".links"
 TABLES = {
     name: path
     for name, path in (("cases", COHORT.cases_file), ("views", COHORT.views_file))
@@ -112,7 +119,7 @@ def artefacts_of(stage, case=None, view=None):
 
 
 def files_of(case, view=None):
-    """Files of the tables that a case, or one of its views, names; a user's folder stands for the files in it."""
+    """Files and folders of the tables that a case, or one of its views, names, by input."""
     files = dict(case_row(case).files())
     for (owner, name), row in COHORT.mammograms.items():
         if owner == case:
@@ -121,11 +128,12 @@ def files_of(case, view=None):
                 for column, p in row.files().items()
                 if view in (None, name)
             }
-    made = MADE.get(case, ())
-    return {
-        n: sorted(map(str, p.iterdir())) if p.is_dir() and p not in made else str(p)
-        for n, p in files.items()
-    }
+    return files
+
+
+def tracked(path):
+    """Names under which Snakemake follows a file, or the files of a user's folder."""
+    return tracked_files(path, LINKS)
 
 
 def inputs_of(stage):
@@ -134,11 +142,11 @@ def inputs_of(stage):
 
     def inputs(wildcards):
         case, view = wildcards.get("case"), wildcards.get("view")
-        files = (
-            files_of(case, view)
-            if case
-            else {name: str(path) for name, path in TABLES.items()}
-        )
+        made = MADE.get(case, ())
+        files = {
+            name: str(path) if path in made else tracked(path)
+            for name, path in (files_of(case, view) if case else TABLES).items()
+        }
         found = {}
         for name in (*record.inputs, *record.optional):
             if name in STAGE_MODULES:
@@ -148,6 +156,24 @@ def inputs_of(stage):
         return {name: paths for name, paths in found.items() if paths}
 
     return inputs
+
+
+def sources_of(stage):
+    """Function of a stage's inputs that are followed under other names: their own names, by input."""
+    record = load_stage(stage)
+
+    def sources(wildcards):
+        case, view = wildcards.get("case"), wildcards.get("view")
+        files = files_of(case, view) if case else TABLES
+        return {
+            name: str(path)
+            for name, path in files.items()
+            if name in (*record.inputs, *record.optional)
+            and path not in MADE.get(case, ())
+            and is_indirect(path)
+        }
+
+    return sources
 
 
 def subject_of(wildcards):

@@ -20,6 +20,7 @@ for stage in (*CASE_STAGES, *VIEW_STAGES, *COHORT_STAGES, *PLAIN_STUDIES):
             settings=settings_of(stage),
             code=stage_digest(stage),
             subject=subject_of,
+            sources=sources_of(stage),
         message:
             message_of(stage)
         script:

@@ -4,7 +4,7 @@
 # The scan's breast on meshes of all sizes.
 rule stability_scan_mesh:
     input:
-        scan=CONFIG.stability_scan or [],
+        scan=tracked(Path(CONFIG.stability_scan)) if CONFIG.stability_scan else [],
     output:
         named("stability_scan_mesh", "stability"),
     log:
@@ -18,6 +18,7 @@ rule stability_scan_mesh:
         settings=settings_of("stability_scan_mesh"),
         code=stage_digest("stability_scan_mesh"),
         subject=subject_of,
+        sources={"scan": CONFIG.stability_scan} if CONFIG.stability_scan else {},
     message:
         "stability: scan"
     script:

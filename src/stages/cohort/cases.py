@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from mammoreg.imaging.views import View
 from stages.cohort.readers.view_codes import registrable_view
+from stages.cohort.series import series_token
 from stages.engine.errors import Fault, FaultsError
 from stages.views import SECOND_VOLUME, view_order
 
@@ -30,6 +31,7 @@ CaseId = Annotated[
     str, Field(pattern=r"^[A-Za-z0-9_-]+$", description="unique id of the breast"), AfterValidator(_not_reserved)
 ]
 ViewName = Annotated[View, BeforeValidator(registrable_view)]
+Pseudonym = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _EXCLUDE = Field(None, description="a reason; the row is kept, not run, and the report says why")
 
@@ -49,7 +51,15 @@ class CaseRow(Row):
 
     case: CaseId
     laterality: Literal["L", "R"] = Field(description="side of the breast")
-    mr: Path = Field(description="undeformed MR volume: NIfTI, or a folder that holds one DICOM series")
+    mr: Path = Field(
+        description="undeformed MR volume: NIfTI, or a folder of DICOM files, a patient's whole export at best: "
+        "the fitting series is chosen and named"
+    )
+    mr_series: str | None = Field(
+        None,
+        pattern=r"^[0-9]+(\.[0-9]+)*$",
+        description="SeriesNumber or SeriesInstanceUID of the series to take, where the choice is to be another",
+    )
     mr_labels: Path | None = Field(
         None,
         description="NIfTI on the MR grid that replaces the automatic segmentation: "
@@ -70,11 +80,14 @@ class CaseRow(Row):
         allow_inf_nan=False,
         description="share of the uncompressed thickness that the plates take away, such as 0.21",
     )
+    patient: Pseudonym | None = Field(None, description="pseudonym that ties the breasts of one woman together")
+    exam: Pseudonym | None = Field(None, description="pseudonym of the examination, where there are several")
     exclude: str | None = _EXCLUDE
 
     def values(self) -> dict[str, str]:
         """Columns that are values, as texts."""
-        return _texts({"compression": self.compression})
+        series = None if self.mr_series is None else series_token(self.mr_series)
+        return _texts({"compression": self.compression, "mr_series": series})
 
 
 class ViewRow(Row):

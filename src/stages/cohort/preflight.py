@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 
 from mammoreg.errors import DataError
+from mammoreg.geometry.frames import Laterality
 from stages.cohort.cases import CaseRow, Cohort, ViewRow
 from stages.cohort.readers.mammogram import is_picture, read_mammogram_facts
-from stages.cohort.readers.mr_header import is_nifti, read_mr_grid
+from stages.cohort.readers.mr import mr_choice
+from stages.cohort.readers.mr_choice import MrChoice
+from stages.cohort.readers.mr_header import MrGrid, is_mr_dicom, is_nifti, read_mr_grid
 from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
 from stages.cohort.readers.whole import check_whole_dicom, check_whole_mr, check_whole_picture
 from stages.engine.errors import Fault
@@ -36,14 +39,36 @@ def check_cohort(cohort: Cohort, made: Collection[Path] = ()) -> list[Fault]:
 
 
 def warnings_of(cohort: Cohort) -> list[str]:
-    """What is no fault but looks like something forgotten, a line each."""
-    return [
+    """What is no fault but looks like something forgotten or is to be known, a line each."""
+    forgotten = [
         f"{cohort.cases_file.name} ({case.case}): has {' and '.join(marks)} but no view, so that nothing is predicted; "
         "add its mammograms to the table of views"
         for case in cohort.cases.values()
         if not cohort.views(case.case)
         and (marks := [c for c in ("mr_lesion", "mr_landmarks") if getattr(case, c) is not None])
     ]
+    return [
+        *forgotten,
+        *(f"{where}: {note}" for where, choice in _mr_choices(cohort) for note in choice.notes),
+    ]
+
+
+def choices_of(cohort: Cohort) -> list[str]:
+    """Which MR series is taken of each folder, and why not the others, a line each."""
+    return [
+        line
+        for where, choice in _mr_choices(cohort)
+        for line in (f"{where}: {choice.taken}", *(f"  left: {what}: {why}" for what, why in choice.left))
+    ]
+
+
+def _mr_choices(cohort: Cohort) -> Iterator[tuple[str, MrChoice]]:
+    """The choices of MR series, by table, case and column."""
+    for case in cohort.cases.values():
+        for column, path, series in (("mr", case.mr, case.mr_series), ("mr_compressed", case.mr_compressed, None)):
+            choice = None if path is None else mr_choice(path, case.laterality, series or "")
+            if choice is not None:
+                yield f"{cohort.cases_file.name} ({case.case}), column {column}", choice
 
 
 class _Checked:
@@ -56,10 +81,12 @@ class _Checked:
 
     def case_faults(self, case: CaseRow) -> Iterator[Fault]:
         yield from self._missing_faults()
-        for column in ("mr", "mr_compressed"):
-            yield from self._fault(column, _check_mr)
-        yield from self._fault("mr_lesion", lambda path: _check_mr_lesion(path, self.files.get("mr")))
-        yield from self._fault("mr_labels", lambda path: _check_labels(path, self.files.get("mr")))
+        series = case.values().get("mr_series", "")
+        yield from self._fault("mr", lambda path: _check_mr(path, case.laterality, series))
+        yield from self._fault("mr_compressed", lambda path: _check_mr(path, case.laterality))
+        mr = partial(self._mr_grid, case.laterality, series)
+        yield from self._fault("mr_lesion", lambda path: _check_mr_lesion(path, mr()))
+        yield from self._fault("mr_labels", lambda path: _check_labels(path, mr()))
         for column in ("mr_landmarks", "mr_surface_points"):
             yield from self._fault(column, read_points)
         for column, partner in (
@@ -73,6 +100,15 @@ class _Checked:
         yield from self._fault("image", lambda p: _check_image(p, view, laterality))
         yield from self._fault("lesion", lambda p: _check_view_lesion(p, self.files.get("image")))
         yield from self._fault("landmarks", read_pixels)
+
+    def _mr_grid(self, side: Laterality, series: str) -> MrGrid | None:
+        """Grid of the case's MR volume; None where it has a fault, which is listed already."""
+        if "mr" not in self.files or "mr" in self.missing:
+            return None
+        try:
+            return read_mr_grid(self.files["mr"], side, series)
+        except DataError:
+            return None
 
     def _missing_faults(self) -> Iterator[Fault]:
         for column in self.missing:
@@ -88,12 +124,14 @@ class _Checked:
             yield Fault(f"{self.where}, column {column}", str(error))
 
 
-def _check_mr(path: Path) -> None:
-    read_mr_grid(path)
-    check_whole_mr(path)
+def _check_mr(path: Path, side: Laterality, series: str = "") -> None:
+    if series and not is_mr_dicom(path):
+        raise DataError(f"{path}: is one volume, and the column mr_series names a series; leave one of them out")
+    read_mr_grid(path, side, series)
+    check_whole_mr(path, side, series)
 
 
-def _check_mr_lesion(path: Path, mr: Path | None) -> None:
+def _check_mr_lesion(path: Path, mr: MrGrid | None) -> None:
     if path.suffix == ".tsv":
         read_spheres(path)
         return
@@ -102,7 +140,7 @@ def _check_mr_lesion(path: Path, mr: Path | None) -> None:
     read_mask(path)
 
 
-def _check_labels(path: Path, mr: Path | None) -> None:
+def _check_labels(path: Path, mr: MrGrid | None) -> None:
     _check_mask_name(path)
     _check_same_grid(path, mr)
     import nibabel
@@ -126,14 +164,10 @@ def _check_mask_name(path: Path) -> None:
         raise DataError(f"{path}: is not NIfTI; give .nii.gz (for a lesion also a .tsv with name x y z diameter_mm)")
 
 
-def _check_same_grid(path: Path, mr: Path | None) -> None:
+def _check_same_grid(path: Path, mr: MrGrid | None) -> None:
     grid = read_mr_grid(path)
-    try:
-        expected = read_mr_grid(mr) if mr and mr.exists() else grid
-    except DataError:
-        return  # the volume's own fault is listed already
-    if not grid.same_as(expected):
-        raise DataError(f"{path}: lies on another grid ({grid}) than mr ({expected}); resample it onto the MR grid")
+    if mr is not None and not grid.same_as(mr):
+        raise DataError(f"{path}: lies on another grid ({grid}) than mr ({mr}); resample it onto the MR grid")
 
 
 def _check_same_names(path: Path, partner: Path | None) -> None:

@@ -120,11 +120,13 @@ def run_stage_by_hand(given: argparse.Namespace) -> int:
 def check(given: argparse.Namespace) -> int:
     """Check tables and files; faults are an error, what only looks odd is printed."""
     from stages.cohort.cases import read_cohort
-    from stages.cohort.preflight import check_cohort, warnings_of
+    from stages.cohort.preflight import check_cohort, choices_of, warnings_of
 
     cohort = read_cohort(given.cases, given.views)
     if faults := check_cohort(cohort):
         raise FaultsError(faults)
+    for line in choices_of(cohort):
+        print(line)
     for warning in warnings_of(cohort):
         print(f"warning: {warning}")
     print(f"{len(cohort.cases)} cases and {len(cohort.mammograms)} mammograms, nothing to mend")

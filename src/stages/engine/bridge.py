@@ -68,12 +68,15 @@ def run_complete(job: Job) -> None:
 
 
 def _inputs(job: Job) -> Mapping[str, Path | list[Path]]:
-    """Paths by input name; the files of a DICOM folder become the folder again."""
+    """Paths by input name; a folder, or a file that Snakemake knows by another name, has its own again."""
     from stages.engine.registry import STAGE_MODULES
 
+    sources = dict(job.params.get("sources", {}))
     found: dict[str, Path | list[Path]] = {}
     for name, paths in job.input.items():
-        if isinstance(paths, str):
+        if name in sources:
+            found[name] = Path(sources[name])
+        elif isinstance(paths, str):
             found[name] = Path(paths)
         elif name in STAGE_MODULES:
             found[name] = [Path(path) for path in paths]

@@ -31,6 +31,7 @@ class PicturedCase:
     inputs: Inputs
     laterality: Laterality
     name: str = ""
+    mr_series: str = ""
 
     @property
     def breast(self) -> PicturedBreast:

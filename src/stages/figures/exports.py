@@ -93,7 +93,7 @@ def _lesions_in_mr(case: PicturedCase) -> dict[str, bytes]:
     path, predictions, labels = case.inputs.path("mr"), case.predictions, file_names(case.lesions)
     if path is None or predictions is None or not case.mammogram_lesions:
         return {}
-    shape, affine = mr_grid(path)
+    shape, affine = mr_grid(path, case.laterality, case.mr_series)
     files = {}
     for name in case.mammogram_lesions:
         for method in sorted({method for view in case.imaged for method in case.methods[view]}):

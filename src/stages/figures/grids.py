@@ -7,12 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.geometry import Volume
+from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers.mr_header import read_mr_grid
 
 
-def mr_grid(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
-    """Shape of the MR volume as the user gave it, and its affine (4, 4) from voxel index to LPS mm."""
-    grid = read_mr_grid(path)
+def mr_grid(path: Path, side: Laterality, series: str) -> tuple[tuple[int, ...], NDArray[np.float64]]:
+    """Shape of the MR volume as the user gave it, and its affine (4, 4) from voxel index to LPS mm.
+
+    Args:
+        path: NIfTI file or folder of DICOM files.
+        side: of the breast.
+        series: the column `mr_series`.
+    """
+    grid = read_mr_grid(path, side, series)
     steps = [(grid.corners[far] - grid.corners[0]) / (n - 1) for far, n in zip((4, 2, 1), grid.shape, strict=True)]
     affine = np.eye(4)
     affine[:3, :3], affine[:3, 3] = np.array(steps).T, grid.corners[0]

@@ -20,7 +20,7 @@ def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     from stages.figures.case import PicturedCase
     from stages.figures.exports import case_exports
 
-    case = PicturedCase(inputs, subject.laterality, subject.case)
+    case = PicturedCase(inputs, subject.laterality, subject.case, subject.row.get("mr_series", ""))
     failure = first_failure(artefact for name in _ARTEFACTS for artefact in inputs.artefacts(name))
     return figures_fields(_pictures(case), case_exports(case), failure)
 

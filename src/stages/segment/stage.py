@@ -9,7 +9,8 @@ from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
 from mammoreg.labels import Label
 from stages.bias import n4_field
-from stages.cohort.readers.mr import read_mr, read_nifti
+from stages.cohort.readers.mr import mr_choice, read_mr, read_nifti
+from stages.cohort.readers.mr_choice import MrChoice
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.segment.record import segment_fields
 
@@ -55,7 +56,8 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     mr_path, labels_path, compressed_path = (inputs.path(n) for n in ("mr", "mr_labels", "mr_compressed"))
     assert mr_path is not None
     side = subject.laterality
-    mr = read_mr(mr_path)
+    series = subject.row.get("mr_series", "")
+    mr, choice = read_mr(mr_path, side, series), mr_choice(mr_path, side, series)
     labels = None if labels_path is None else read_nifti(labels_path)
     if labels is not None and not _same_grid(mr, labels):
         raise DataError("mr_labels lies on another grid than mr; resample it onto the MR grid")
@@ -68,9 +70,9 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         "breast_mask": found.mr.with_data(found.breast.astype(np.uint8)),
     }
     if compressed_path is not None:
-        second = read_mr(compressed_path).to_breast(side)
+        second = read_mr(compressed_path, side).to_breast(side)
         volumes["compressed_mask"] = segment_body(second, settings.spacing_mm)
-    return segment_fields(volumes, found.back, found.nipple, side, _values(found))
+    return segment_fields(volumes, found.back, found.nipple, side, _values(found) | _choice_values(choice))
 
 
 def _back_settings(settings: Settings) -> BackSettings:
@@ -94,6 +96,14 @@ def _values(found: Segmentation) -> dict[str, Value]:
         "breast_volume_ml": round(float(found.breast.sum()) * found.mr.voxel_mm3 / 1000.0, 3),
         "gland_share": round(float((found.labels[found.breast] == Label.GLAND).mean()), 4),
     }
+
+
+def _choice_values(choice: MrChoice | None) -> dict[str, Value]:
+    """Which series was taken of a folder of DICOM files, and why not the others."""
+    if choice is None:
+        return {}
+    left = [{"series": what, "left because": why} for what, why in choice.left]
+    return {"mr_series": choice.taken, "mr_series_left": left, "mr_series_notes": list(choice.notes)}
 
 
 STAGE = Stage(

@@ -1,6 +1,5 @@
-"""MR volumes as axis-aligned LPS volumes: NIfTI files and folders that hold one DICOM series."""
+"""MR volumes as axis-aligned LPS volumes: NIfTI files, and the fitting stack of a folder of DICOM files."""
 
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -9,23 +8,38 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume, volume_of_affine
-from stages.cohort.readers.mr_header import read_mr_grid
+from mammoreg.geometry.frames import Laterality
+from stages.cohort.readers.mr_choice import MrChoice
+from stages.cohort.readers.mr_folder import choose_mr
+from stages.cohort.readers.mr_header import is_mr_dicom, read_mr_grid
+from stages.cohort.readers.mr_voxels import stack_voxels
 
-SLICE_TOLERANCE = 0.05
-"""Slice distances may differ by this share."""
 
-
-def read_mr(path: Path) -> Volume:
+def read_mr(path: Path, side: Laterality | None = None, series: str = "") -> Volume:
     """Read the intensities of an MR volume, LPS mm, float32; oblique ones are resampled, 0 outside.
 
+    Args:
+        path: NIfTI file, or folder of DICOM files.
+        side: of the breast; None where it does not matter.
+        series: the column `mr_series`.
+
     Raises:
-        DataError: unreadable, another modality, several series, no sensible grid, or values that are not finite.
+        DataError: unreadable, another modality, no fitting series, no sensible grid, or values that are not finite.
     """
-    read_mr_grid(path)
-    data, affine = _dicom_voxels(path) if path.is_dir() else _nifti_voxels(path)
+    read_mr_grid(path, side, series)
+    data, affine = _dicom_voxels(path, side, series) if is_mr_dicom(path) else _nifti_voxels(path)
     if not np.isfinite(data).all():
         raise DataError(f"{path}: holds values that are not finite (NaN or infinite); export the volume again")
-    return volume_of_affine(data.astype(np.float32), affine, order=1)
+    return volume_of_affine(data.astype(np.float32, copy=False), affine, order=1)
+
+
+def mr_choice(path: Path, side: Laterality | None = None, series: str = "") -> MrChoice | None:
+    """The account of the series that `read_mr` takes of a folder; None of a NIfTI file, which holds one volume.
+
+    Raises:
+        DataError: as `read_mr`.
+    """
+    return choose_mr(path, side, series) if is_mr_dicom(path) else None
 
 
 def read_nifti(path: Path) -> Volume:
@@ -42,55 +56,19 @@ def read_nifti(path: Path) -> Volume:
 
 
 def _nifti_voxels(path: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:
-    """Voxels and the affine to LPS of a NIfTI file."""
+    """Voxels and the affine to LPS of a NIfTI file whose header was checked."""
     import nibabel
 
     try:
         image: Any = nibabel.load(path)
-        if int(image.header["sform_code"]) == 0 and int(image.header["qform_code"]) == 0:
-            raise DataError(f"{path}: the header gives no orientation (sform and qform are unset); export again")
         data = np.asanyarray(image.dataobj)
         affine = np.diag([-1.0, -1.0, 1.0, 1.0]) @ image.affine
-    except (OSError, EOFError, zlib.error, ValueError) as error:
-        if isinstance(error, DataError):
-            raise
+    except Exception as error:  # what decompresses and what scales have exceptions of their own
         raise DataError(f"{path}: the voxels cannot be read; the file may be truncated, copy it again") from error
-    if data.dtype.kind not in "biuf":
-        raise DataError(f"{path}: holds {data.dtype} voxels, not grey values; export the magnitude volume")
     return data.reshape(data.shape[:3]), affine
 
 
-def _dicom_voxels(folder: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:
-    """Voxels, rescaled as the headers say, and the affine to LPS of the one DICOM series of a folder."""
-    import SimpleITK
-
-    series = SimpleITK.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
-    if len(series) != 1:
-        raise DataError(f"{folder}: holds {len(series)} stacks of DICOM slices; keep the files of one volume in it")
-    names = SimpleITK.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), series[0])
-    _check_slices(folder, names)
-    try:
-        image = SimpleITK.ReadImage(names)
-    except RuntimeError as error:
-        raise DataError(f"{folder}: pixels are missing or cannot be decoded; export the series again") from error
-    affine = np.eye(4)
-    affine[:3, :3] = np.array(image.GetDirection()).reshape(3, 3) * np.array(image.GetSpacing())
-    affine[:3, 3] = image.GetOrigin()
-    return SimpleITK.GetArrayFromImage(image).transpose(2, 1, 0), affine
-
-
-def _check_slices(folder: Path, names: tuple[str, ...]) -> None:
-    """Refuse a stack with a slice missing, a place taken twice, or slices of unlike size."""
-    from pydicom import dcmread
-
-    headers = [dcmread(name, stop_before_pixels=True) for name in names]
-    if len({(h.Rows, h.Columns) for h in headers}) > 1:
-        raise DataError(f"{folder}: the slices differ in size; keep the files of one volume in it")
-    places = np.array([h.ImagePositionPatient for h in headers], dtype=float)
-    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    middle = float(np.median(steps))
-    if middle <= 0.0 or np.abs(steps - middle).max() > SLICE_TOLERANCE * middle:
-        raise DataError(
-            f"{folder}: slices lie {steps.min():.2f} to {steps.max():.2f} mm apart; one is missing or several volumes "
-            "are mixed; export one complete series"
-        )
+def _dicom_voxels(path: Path, side: Laterality | None, series: str) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Voxels, rescaled as the headers say, and the affine to LPS of the fitting stack."""
+    stack = choose_mr(path, side, series).stack
+    return stack_voxels(stack), stack.affine

@@ -1,5 +1,6 @@
 """Grids of MR volumes from their headers, without decoding voxels: what preflight asks for."""
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -9,11 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
+from mammoreg.geometry.frames import Laterality
+from stages.cohort.readers.dicom_headers import read_dicom
+from stages.cohort.readers.mr_folder import choose_mr
+from stages.cohort.readers.mr_stacks import FEWEST_VOXELS
 
 NIFTI = (".nii", ".nii.gz")
 SPACING_MM = (0.1, 15.0)
-FEWEST_VOXELS = 8
+LONGEST_MM = 1500.0
+MOST_VOXELS = 1_000_000_000
 _SAME_PLACE_MM = 0.1
+_SAME_SPACING = 0.02
+_FLAT = 0.2
 
 
 @dataclass(frozen=True)
@@ -48,94 +56,91 @@ def is_nifti(path: Path) -> bool:
     return path.name.lower().endswith(NIFTI)
 
 
-def read_mr_grid(path: Path) -> MrGrid:
-    """Grid of a NIfTI file, or of a folder that holds one DICOM series.
+def is_mr_dicom(path: Path) -> bool:
+    """Whether a path is taken for DICOM: a folder, or a file that begins so.
+
+    Raises:
+        DataError: the file is DICOM and damaged.
+    """
+    return path.is_dir() or (not is_nifti(path) and read_dicom(path) is not None)
+
+
+def read_mr_grid(path: Path, side: Laterality | None = None, series: str = "") -> MrGrid:
+    """Grid of a NIfTI file, or of the fitting stack of DICOM slices in a folder.
+
+    Args:
+        path: the file or folder.
+        side: of the breast; None where it does not matter.
+        series: the column `mr_series`.
 
     Raises:
         DataError: the header is unreadable, of another modality, or no sensible volume.
     """
-    if path.is_dir():
-        return _checked(path, *_dicom_affine(path))
+    if is_mr_dicom(path):
+        stack = choose_mr(path, side, series).stack
+        return _checked(path, stack.shape, stack.affine)
     if not is_nifti(path):
-        raise DataError(f"{path}: is neither NIfTI nor a folder; give .nii, .nii.gz or the folder of one DICOM series")
+        raise DataError(f"{path}: is neither NIfTI nor DICOM; give .nii, .nii.gz or the folder of an MR series")
     return _checked(path, *_nifti_affine(path))
 
 
 def _nifti_affine(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
     import nibabel
-    from nibabel.filebasedimages import ImageFileError
 
     try:
         image: Any = nibabel.load(path)
-        shape, affine = image.shape, image.affine
-        zooms = _stored_spacing(path, type(image.header))
-    except (OSError, EOFError, ValueError, ImageFileError) as error:
+        shape, affine, kind = image.shape, image.affine, image.get_data_dtype()
+        stored = _stored_header(path, type(image.header))
+        zooms = np.asarray(stored["pixdim"][1:4], dtype=float)
+        placed = int(stored["sform_code"]) != 0 or int(stored["qform_code"]) != 0
+    except Exception as error:  # nibabel has exceptions of its own for each part of a header
         raise DataError(f"{path}: cannot be read as NIfTI; export the volume again") from error
+    if kind.kind not in "biuf":
+        raise DataError(f"{path}: holds {kind} voxels, not grey values; export the magnitude volume")
     if not np.all(zooms > 0):
         listed = " x ".join(f"{z:g}" for z in zooms)
         raise DataError(f"{path}: the header's voxel spacing is {listed} mm; correct it or export the volume again")
+    if not placed:
+        raise DataError(f"{path}: the header gives no orientation (sform and qform are unset); export again")
+    _check_spacing(path, zooms, np.linalg.norm(affine[:3, :3], axis=0))
     shape = shape[:3] if all(n == 1 for n in shape[3:]) else shape
     return shape, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
 
 
-def _stored_spacing(path: Path, header: Any) -> NDArray[np.float64]:
-    """Voxel spacing as the file has it: on loading nibabel takes 1 for 0."""
+def _stored_header(path: Path, header: Any) -> Any:
+    """The header as the file has it: on loading nibabel takes a spacing of 1 for 0."""
     from nibabel.openers import ImageOpener
 
     with ImageOpener(path) as file:
-        return np.asarray(header.from_fileobj(file, check=False)["pixdim"][1:4], dtype=float)
+        return header.from_fileobj(file, check=False)
 
 
-def _dicom_affine(folder: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
-    slices = _slices(folder)
-    if len({s.get("SeriesInstanceUID") for s in slices}) > 1:
-        raise DataError(f"{folder}: holds several DICOM series; keep the files of one in it")
-    try:
-        first = slices[0]
-        along_row, along_column = np.array(first.ImageOrientationPatient, dtype=float).reshape(2, 3)
-        normal = np.cross(along_row, along_column)
-        slices.sort(key=lambda s: float(np.dot(normal, np.array(s.ImagePositionPatient, dtype=float))))
-        start, end = (np.array(slices[i].ImagePositionPatient, dtype=float) for i in (0, -1))
-        between_rows, between_columns = (float(v) for v in first.PixelSpacing)
-        shape = (int(first.Columns), int(first.Rows), len(slices))
-    except (AttributeError, TypeError, ValueError) as error:
-        raise DataError(f"{folder}: the DICOM headers lack the slices' place; export the series again") from error
-    affine = np.eye(4)
-    step = (end - start) / max(len(slices) - 1, 1)
-    affine[:3] = np.column_stack([along_row * between_columns, along_column * between_rows, step, start])
-    return shape, affine
-
-
-def _slices(folder: Path) -> list[Any]:
-    from pydicom import dcmread
-    from pydicom.errors import InvalidDicomError
-
-    found = []
-    for member in sorted(p for p in folder.iterdir() if p.is_file() and not p.name.startswith(".")):
-        try:
-            header = dcmread(member, stop_before_pixels=True)
-        except (OSError, InvalidDicomError, EOFError, ValueError):
-            continue
-        if "ImagePositionPatient" in header or header.get("Modality") != "MR":
-            found.append(header)
-    if not found:
-        raise DataError(f"{folder}: holds no DICOM image; name the folder of one MR series")
-    if other := sorted({str(s.get("Modality", "none")) for s in found} - {"MR"}):
-        raise DataError(f"{folder}: modality is {', '.join(other)}, not MR; name the folder of one MR series")
-    return found
+def _check_spacing(path: Path, zooms: NDArray[np.float64], spacing: NDArray[np.float64]) -> None:
+    """Refuse a header that gives two sizes of a voxel."""
+    if np.isfinite(spacing).all() and np.abs(zooms - spacing).max() > _SAME_SPACING * spacing.min():
+        two = " and ".join(" x ".join(f"{s:.4g}" for s in sizes) for sizes in (zooms, spacing))
+        raise DataError(
+            f"{path}: pixdim and the affine give two voxel spacings, {two} mm; correct the header or export again"
+        )
 
 
 def _checked(path: Path, shape: tuple[int, ...], affine: NDArray[np.float64]) -> MrGrid:
-    if len(shape) != 3 or min(shape) < FEWEST_VOXELS:
-        size = " x ".join(str(n) for n in shape)
+    size = " x ".join(str(n) for n in shape)
+    if len(shape) > 3:
+        raise DataError(f"{path}: holds several volumes ({size} voxels); write the one before contrast to its own file")
+    if len(shape) < 3 or min(shape) < FEWEST_VOXELS:
         raise DataError(f"{path}: has {size} voxels, which is no volume; give one with at least {FEWEST_VOXELS} a side")
     spacing = np.linalg.norm(affine[:3, :3], axis=0)
     low, high = SPACING_MM
+    listed = " x ".join(f"{s:.3g}" for s in spacing)
     if not np.all(np.isfinite(affine)) or spacing.min() < low or spacing.max() > high:
-        listed = " x ".join(f"{s:.3g}" for s in spacing)
         raise DataError(
             f"{path}: the voxel spacing is {listed} mm, outside {low:g} to {high:g}; "
             "correct the header or export the volume again"
         )
+    if max(n * s for n, s in zip(shape, spacing, strict=True)) > LONGEST_MM or math.prod(shape) > MOST_VOXELS:
+        raise DataError(f"{path}: {size} voxels of {listed} mm are no breast volume; export the volume again")
+    if abs(np.linalg.det(affine[:3, :3])) < _FLAT * np.prod(spacing):
+        raise DataError(f"{path}: the header's axes do not span a volume; export the volume again")
     ends = np.array(list(product(*[(0, n - 1) for n in shape])), dtype=float)
     return MrGrid(shape, tuple(spacing), ends @ affine[:3, :3].T + affine[:3, 3])

@@ -7,20 +7,25 @@ from pathlib import Path
 from typing import Any
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.mr_header import is_nifti
+from mammoreg.geometry.frames import Laterality
+from stages.cohort.readers.mr_folder import choose_mr
+from stages.cohort.readers.mr_header import is_mr_dicom, is_nifti
+from stages.cohort.readers.mr_voxels import stored_frames
 
 _CHUNK = 1 << 22
 
 
-def check_whole_mr(path: Path) -> None:
-    """Check that a NIfTI file, or each DICOM file of a folder, is as long as its header says.
+def check_whole_mr(path: Path, side: Laterality | None = None, series: str = "") -> None:
+    """Check that a NIfTI file, or each DICOM file of the stack that is taken, is as long as its header says.
 
     Raises:
-        DataError: voxels are missing, or what compresses them is damaged.
+        DataError: voxels are missing, or what compresses them is damaged or cannot be decoded.
     """
-    if path.is_dir():
-        for member in sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith(".")):
+    if is_mr_dicom(path):
+        files = dict.fromkeys(frame.file for frame in choose_mr(path, side, series).stack.frames)
+        for member in files:
             check_whole_dicom(member)
+        stored_frames(next(iter(files)))  # one shows whether the compression can be read
     elif is_nifti(path):
         _check_whole_nifti(path)
 
