@@ -17,11 +17,10 @@ from mammoreg.localization.lesions import (
     area_from_mask,
 )
 from mammoreg.metrics.distances import breast_scale_mm
-from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
+from stages.cohort.readers.masks import mask_names, read_image_mask, read_masks
+from stages.cohort.readers.points import MASK_NAME, is_list, read_discs, read_pixels, read_points, read_spheres
 from stages.engine.contract import Inputs
 from stages.pose.record import PoseRecord
-
-MASK_NAME = "lesion"
 
 
 def mr_landmarks(inputs: Inputs, name: str = "mr_landmarks") -> dict[str, Points]:
@@ -35,17 +34,17 @@ def mr_lesions(inputs: Inputs) -> dict[str, MrLesion]:
     path = inputs.path("mr_lesion")
     if path is None:
         return {}
-    if path.suffix == ".tsv":
+    if is_list(path):
         return {name: SphereLesion(centre, diameter) for name, (centre, diameter) in read_spheres(path).items()}
-    return {MASK_NAME: MaskLesion(read_mask(path))}
+    return {name: MaskLesion(mask) for name, mask in read_masks(path).items()}
 
 
 def mr_lesion_names(inputs: Inputs) -> list[str]:
-    """Names of the lesions of `mr_lesion`; a mask is not opened for that."""
+    """Names of the lesions of `mr_lesion`; a NIfTI mask is not opened for that."""
     path = inputs.path("mr_lesion")
     if path is None:
         return []
-    return list(read_spheres(path)) if path.suffix == ".tsv" else [MASK_NAME]
+    return list(read_spheres(path)) if is_list(path) else mask_names(path)
 
 
 def view_landmarks(inputs: Inputs, view: str) -> dict[str, NDArray[np.float64]]:
@@ -59,7 +58,7 @@ def view_lesion_names(inputs: Inputs, view: str) -> list[str]:
     path = inputs.path(f"lesion_{view}")
     if path is None:
         return []
-    return list(read_discs(path)) if path.suffix == ".tsv" else [MASK_NAME]
+    return list(read_discs(path)) if is_list(path) else [MASK_NAME]
 
 
 def view_areas(inputs: Inputs, pose: PoseRecord) -> dict[str, LesionArea]:
@@ -67,7 +66,7 @@ def view_areas(inputs: Inputs, pose: PoseRecord) -> dict[str, LesionArea]:
     path = inputs.path(f"lesion_{pose.view}")
     if path is None:
         return {}
-    if path.suffix != ".tsv":
+    if not is_list(path):
         mask, size = read_image_mask(path), (pose.storage.rows, pose.storage.columns)
         if mask.shape != size:
             raise DataError(

@@ -163,6 +163,32 @@ def test_table_as_spreadsheets_write_it(tmp_path):
     assert list(read_cohort(path, None).cases) == ["c1"]
 
 
+def test_table_with_other_separators_quotes_and_trailing_tabs(tmp_path):
+    path = tmp_path / "cases.tsv"
+    for text in (
+        "case\tlaterality\tmr\t\nc1\tL\tmr.nii.gz\t\n",
+        '"case";"laterality";"mr"\r\n"c1";"L";"mr.nii.gz"\r\n',
+        'case,laterality,mr\nc1,L,"mr.nii.gz"\n',
+    ):
+        path.write_text(text)
+        assert read_cohort(path, None).cases["c1"].mr == tmp_path / "mr.nii.gz"
+
+
+def test_cells_under_no_name(tmp_path):
+    (tmp_path / "cases.tsv").write_text("case\tlaterality\t\tmr\nc1\tL\tx\tmr.nii.gz\n")
+    with pytest.raises(FaultsError, match="row 1: a column with cells has no name; name it or empty its cells"):
+        read_cohort(tmp_path / "cases.tsv", None)
+
+
+def test_swapped_tables_are_said_once(tmp_path):
+    cases, views = write_tsv(tmp_path / "a.tsv", CASE), write_tsv(tmp_path / "b.tsv", VIEW)
+    with pytest.raises(FaultsError) as error:
+        read_cohort(views, cases)
+    (fault,) = error.value.faults
+    assert "b.tsv and " in str(fault)
+    assert "a.tsv: these tables are swapped; give the table of the breasts first" in str(fault)
+
+
 @requires_shared("twins")
 @pytest.mark.parametrize(("folder", "cases", "views"), [("twins", 3, 4), ("victre", 1, 1), ("mri", 12, 0)])
 def test_tables_of_the_development_data(folder, cases, views):

@@ -163,7 +163,9 @@ def test_check_recognises_swapped_tables(tmp_path, capsys):
     assert main(["check", str(folder / "views.tsv"), str(folder / "cases.tsv")]) == 1
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 2
-    assert "views.tsv: is given as cases, but is the table of the mammograms; give the table of the breasts" in lines[1]
+    assert "cases.tsv: these tables are swapped; give the table of the breasts first" in lines[1]
+    assert main(["check", str(folder / "views.tsv")]) == 1
+    assert "views.tsv: is given as cases, but is the table of the mammograms" in capsys.readouterr().err
 
 
 def test_check_warns_of_marks_that_predict_nothing(tmp_path, capsys):

@@ -1,5 +1,6 @@
 """Preflight: each kind of bad file with the message that a user reads."""
 
+import nibabel
 import numpy as np
 import pytest
 from PIL import Image
@@ -121,8 +122,13 @@ def test_lesion_mask_on_another_grid(folder):
     moved = AFFINE.copy()
     moved[0, 3] = 5.0
     write_volume(folder / "mr_lesion.nii.gz", ball(SHAPE, (5, 6, 7)), moved)
+    _assert_only(folder, "lies on another grid than mr: the same voxels, but (-5.00, 0.00, 0.00) mm off (LPS)")
+    moved[0, 3] = 0.2
+    write_volume(folder / "mr_lesion.nii.gz", ball(SHAPE, (5, 6, 7)), moved)
+    _assert_only(folder, "but (-0.20, 0.00, 0.00) mm off (LPS); resample it onto the MR grid")
+    write_volume(folder / "mr_lesion.nii.gz", ball(SHAPE, (5, 6, 7)), np.diag([-1.4, -1.4, 2.8, 1.0]))
     _assert_only(
-        folder, "lies on another grid (12 x 14 x 16 voxels of 1.4 x 1.4 x 1.4 mm", "resample it onto the MR grid"
+        folder, "lies on another grid (12 x 14 x 16 voxels of 1.4 x 1.4 x 2.8 mm around (8, 9, 21)) than mr (12"
     )
 
 
@@ -142,6 +148,59 @@ def test_lesion_mask_of_another_size_than_the_mammogram(folder):
 def test_unknown_labels(folder):
     write_volume(folder / "mr_labels.nii.gz", np.full(SHAPE, 7, np.uint8))
     _assert_only(folder, "holds the labels 7; known are 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall")
+
+
+def test_labels_that_a_scale_factor_has_rounded(folder):
+    write_volume(folder / "mr_labels.nii.gz", np.full(SHAPE, 0.9999998, np.float32))
+    assert _faults(folder) == []
+    write_volume(folder / "mr_labels.nii.gz", np.full(SHAPE, 1.4, np.float32))
+    _assert_only(folder, "holds the labels 1.39999998; known are 0 background")
+
+
+def test_a_volume_without_orientation_is_blamed_itself(folder):
+    image = nibabel.load(folder / "mr.nii.gz")
+    image.set_sform(None, 0)
+    image.set_qform(None, 0)
+    image.to_filename(folder / "mr.nii.gz")
+    _assert_only(folder, "column mr: ", "mr.nii.gz: the header gives no orientation (sform and qform are unset)")
+
+
+def test_points_in_another_frame(folder):
+    """The volume spans 0 to 15, 18 and 21 mm."""
+    rows = [{"name": f"P{n}", "x": f"-{n}", "y": "-2", "z": "3"} for n in range(3, 8)]
+    write_tsv(folder / "points.tsv", *rows)
+    _assert_only(
+        folder,
+        "column mr_landmarks",
+        "P3, P4, P5 and 2 more lie outside the MR volume (x 0 to 15, y 0 to 18, z 0 to 21 mm, LPS)",
+        "with x and y negated all lie inside, so they seem to be RAS: give LPS coordinates",
+    )
+    write_tsv(folder / "points.tsv", {"name": "P1", "x": "1", "y": "2", "z": "-9"})
+    _assert_only(folder, "P1 lies outside", "with z negated all lie inside: give LPS")
+    write_tsv(folder / "points.tsv", {"name": "P1", "x": "1", "y": "2", "z": "90"})
+    _assert_only(folder, "P1 lies outside", "give LPS coordinates in mm in the frame of this volume")
+    write_tsv(folder / "points.tsv", {"name": "P1", "x": "-1.3", "y": "2", "z": "22.3"})
+    assert _faults(folder) == [], "within a voxel of the border"
+
+
+def test_lesion_outside_the_volume(folder):
+    lesion = {"name": "mass", "x": "-5", "y": "-6", "z": "7", "diameter_mm": "4"}
+    write_tsv(folder / "mass.tsv", lesion)
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "mr.nii.gz", "mr_lesion": "mass.tsv"})
+    _assert_only(folder, "column mr_lesion", "mass lies outside the MR volume", "they seem to be RAS")
+
+
+def test_pixels_off_the_picture(folder):
+    write_tsv(folder / "pixels.tsv", {"name": "P1", "column": "35", "row": "4"})
+    _assert_only(
+        folder,
+        "column landmarks",
+        "P1 lies outside the picture (30 columns, 40 rows); with column and row exchanged all lie on it",
+    )
+    write_tsv(folder / "pixels.tsv", {"name": "P1", "column": "3", "row": "4"})
+    write_tsv(folder / "lesion.tsv", {"name": "m", "column": "3", "row": "99", "diameter_mm": "5"})
+    write_tsv(folder / "views.tsv", {"case": "c1", "view": "CC", "image": "cc.dcm", "lesion": "lesion.tsv"})
+    _assert_only(folder, "column lesion", "m lies outside the picture", "the first pixel being 0 0")
 
 
 def test_zero_spacing_of_the_volume(folder):

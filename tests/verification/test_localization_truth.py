@@ -16,7 +16,7 @@ from mammoreg.localization.lesions import LesionArea, MaskLesion, area_from_mask
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
 from mammoreg.localization.to_mr import MrPrediction, locate_in_breast
 from mammoreg.metrics.distances import detector_distance_mm
-from stages.cohort.readers.points import read_image_mask, read_mask
+from stages.cohort.readers.masks import read_image_mask, read_masks
 from tests.shared_data import DATA, requires_shared
 
 TWINS = DATA / "twins"
@@ -67,7 +67,7 @@ def load(case: str) -> Twin:
             found = file[view]["points_column_row"][()]
             pixels[view] = np.stack([columns - 1 - found[:, 0], found[:, 1]], axis=1)
             views[view], mask = _view(file[view], rows, columns, points, pixels[view])
-    lesion = MaskLesion(read_mask(TWINS / "mr" / f"{case}_lesion.nii.gz"))
+    lesion = MaskLesion(read_masks(TWINS / "mr" / f"{case}_lesion.nii.gz")["lesion"])
     return Twin(views, areas, lesion, BreastGrid(mask), points, pixels)
 
 

@@ -1,18 +1,16 @@
 """The two tables that a user hands in: their models, and the cohort that they describe."""
 
-import csv
-import difflib
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from mammoreg.imaging.views import View
 from stages.cohort.readers.view_codes import registrable_view
+from stages.cohort.rows import Row, looks_like, read_rows
 from stages.cohort.series import series_token
 from stages.engine.errors import Fault, FaultsError
 from stages.views import SECOND_VOLUME, view_order
@@ -36,16 +34,6 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _EXCLUDE = Field(None, description="a reason; the row is kept, not run, and the report says why")
 
 
-class Row(BaseModel):
-    """A row of a table."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    def files(self) -> dict[str, Path]:
-        """The files that the row names, by column."""
-        return {name: value for name, value in self if isinstance(value, Path)}
-
-
 class CaseRow(Row):
     """One breast."""
 
@@ -66,9 +54,11 @@ class CaseRow(Row):
         "0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall",
     )
     mr_lesion: Path | None = Field(
-        None, description="NIfTI mask on the MR grid, or .tsv with name, x, y, z, diameter_mm (LPS, mm)"
+        None,
+        description="NIfTI mask on the MR grid, 3D Slicer segmentation (.seg.nrrd), DICOM SEG, or "
+        ".tsv with name, x, y, z, diameter_mm (LPS, mm), or 3D Slicer markups (.mrk.json, .fcsv)",
     )
-    mr_landmarks: Path | None = Field(None, description=".tsv with name, x, y, z (LPS, mm)")
+    mr_landmarks: Path | None = Field(None, description=".tsv with name, x, y, z (LPS, mm), or 3D Slicer markups")
     mr_compressed: Path | None = Field(None, description="second MR volume of the breast between the plates")
     mr_compressed_landmarks: Path | None = Field(None, description=".tsv with the same names in the second volume")
     mr_surface_points: Path | None = Field(None, description=".tsv with points of the skin before compression")
@@ -166,8 +156,8 @@ def read_cohort(cases: Path, views: Path | None, files_in: Path | None = None) -
     """
     _check_order(cases, views)
     faults: list[Fault] = []
-    case_rows, ids = _read_rows(cases, CaseRow, files_in, faults)
-    view_rows = _read_rows(views, ViewRow, files_in, faults)[0] if views else []
+    case_rows, ids = read_rows(cases, CaseRow, files_in, faults)
+    view_rows = read_rows(views, ViewRow, files_in, faults)[0] if views else []
     faults += _duplicates(cases, [(n, (row.case,)) for n, row in case_rows])
     for number, row in case_rows:
         faults += _orphans(cases, number, row)
@@ -182,102 +172,16 @@ def read_cohort(cases: Path, views: Path | None, files_in: Path | None = None) -
 
 def _check_order(cases: Path, views: Path | None) -> None:
     """Tables in each other's place would be a fault a cell; they are told by their columns, and said once."""
-    given = [(cases, "cases"), *([(views, "views")] if views else [])]
-    for path, wanted in given:
-        columns = _columns(path)
-        other, model, mine = ("views", ViewRow, CaseRow) if wanted == "cases" else ("cases", CaseRow, ViewRow)
-        if _required(model) <= columns and not _required(mine) <= columns:
-            meanings = {"cases": "the table of the breasts", "views": "the table of the mammograms"}
-            remedy = "give the table of the breasts first, then that of the mammograms"
-            raise FaultsError([Fault(str(path), f"is given as {wanted}, but is {meanings[other]}", remedy)])
-
-
-def _columns(path: Path) -> set[str]:
-    """The names in a table's first line; none where it cannot be read, which is told later."""
-    try:
-        with path.open(encoding="utf-8-sig") as file:
-            return {name.strip() for name in file.readline().split("\t")}
-    except (OSError, UnicodeDecodeError):
-        return set()
-
-
-AnyRow = TypeVar("AnyRow", bound=Row)
-
-
-def _read_rows(
-    path: Path, model: type[AnyRow], files_in: Path | None, faults: list[Fault]
-) -> tuple[list[tuple[int, AnyRow]], set[str]]:
-    """Good rows of a table with their line numbers, and the ids of all; what is wrong is added to `faults`."""
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            lines = [[cell.strip() for cell in line] for line in csv.reader(file, delimiter="\t")]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        faults.append(Fault(str(path), f"cannot be read ({reason})", "give a tab-separated table in UTF-8"))
-        return [], set()
-    header = lines[0] if lines else []
-    faults += _header_faults(path, header, model)
-    if _required(model) - set(header) or len(set(header)) < len(header):
-        return [], set()
-    filled = [(number, line) for number, line in enumerate(lines[1:], start=2) if any(line)]
-    column = header.index("case")
-    folder = path.parent if files_in is None else files_in
-    found = [(number, _row(path, number, header, line, model, folder, faults)) for number, line in filled]
-    return [(n, row) for n, row in found if row], {line[column] for _, line in filled if column < len(line)}
-
-
-def _header_faults(path: Path, header: Sequence[str], model: type[Row]) -> list[Fault]:
-    columns, where = list(model.model_fields), f"{path.name} row 1"
-    faults = []
-    for name in header:
-        if name not in columns:
-            near = difflib.get_close_matches(name.lower(), columns, n=1, cutoff=0.0)[0]
-            faults.append(Fault(where, f"unknown column {name!r}", f"the nearest known one is {near!r}"))
-    for name in sorted({name for name in header if header.count(name) > 1}):
-        faults.append(Fault(where, f"column {name!r} is there twice", "keep one of them"))
-    for name in (name for name in columns if name in _required(model) and name not in header):
-        remedy = "add it, and separate columns by tabs" if len(header) < 2 else "add it"
-        faults.append(Fault(where, f"the required column {name!r} is missing", remedy))
-    return faults
-
-
-def _required(model: type[Row]) -> set[str]:
-    return {name for name, info in model.model_fields.items() if info.is_required()}
-
-
-def _row(
-    path: Path,
-    number: int,
-    header: Sequence[str],
-    line: Sequence[str],
-    model: type[AnyRow],
-    folder: Path,
-    faults: list[Fault],
-) -> AnyRow | None:
-    where = f"{path.name} row {number} ({line[0]})"
-    if len(line) > len(header):
-        what = f"{len(line)} cells under {len(header)} columns"
-        faults.append(Fault(where, what, "remove the surplus, or give each cell a column"))
-        return None
-    cells = {name: cell for name, cell in zip(header, line, strict=False) if cell and name in model.model_fields}
-    for name, info in model.model_fields.items():
-        if name in cells and info.annotation in (Path, Path | None):
-            cells[name] = os.path.normpath(folder / cells[name])
-    try:
-        return model.model_validate(cells)
-    except ValidationError as error:
-        faults += [_fault(where, model, dict(detail)) for detail in error.errors()]
-        return None
-
-
-def _fault(where: str, model: type[Row], detail: Mapping[str, Any]) -> Fault:
-    """A pydantic error in the words of the table's user."""
-    column = str(detail["loc"][0])
-    meaning = model.model_fields[column].description or ""
-    if detail["type"] == "missing":
-        return Fault(f"{where}, column {column}", "is empty", f"give it: {meaning}")
-    what = f"{detail['input']!r} is not permitted: {detail['msg'].removeprefix('Value error, ')}"
-    return Fault(f"{where}, column {column}", what, f"it is the {meaning}" if meaning else "correct it")
+    first = looks_like(cases, CaseRow, ViewRow)
+    second = views is not None and looks_like(views, ViewRow, CaseRow)
+    remedy = "give the table of the breasts first, then that of the mammograms"
+    if first and second:
+        raise FaultsError([Fault(f"{cases} and {views}", "these tables are swapped", remedy)])
+    if first:
+        what = "is given as cases, but is the table of the mammograms"
+        raise FaultsError([Fault(str(cases), what, remedy)])
+    if second:
+        raise FaultsError([Fault(str(views), "is given as views, but is the table of the breasts", remedy)])
 
 
 def _duplicates(path: Path, keys: Iterable[tuple[int, tuple[str, ...]]]) -> list[Fault]:

@@ -10,11 +10,20 @@ import numpy as np
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.cases import CaseRow, Cohort, ViewRow
+from stages.cohort.mark_checks import (
+    check_mr_lesion,
+    check_mr_points,
+    check_same_grid,
+    check_same_names,
+    check_view_landmarks,
+    check_view_lesion,
+)
 from stages.cohort.readers.mammogram import is_picture, read_mammogram_facts
-from stages.cohort.readers.mr import mr_choice
+from stages.cohort.readers.markups import UNKNOWN_DIAMETER_MM
+from stages.cohort.readers.mr import mr_choice, read_labels
 from stages.cohort.readers.mr_choice import MrChoice
 from stages.cohort.readers.mr_header import MrGrid, is_mr_dicom, is_nifti, read_mr_grid
-from stages.cohort.readers.points import read_discs, read_image_mask, read_mask, read_pixels, read_points, read_spheres
+from stages.cohort.readers.points import is_list, without_diameter
 from stages.cohort.readers.whole import check_whole_dicom, check_whole_mr, check_whole_picture
 from stages.engine.errors import Fault
 
@@ -40,15 +49,13 @@ def check_cohort(cohort: Cohort, made: Collection[Path] = ()) -> list[Fault]:
 
 def warnings_of(cohort: Cohort) -> list[str]:
     """What is no fault but looks like something forgotten or is to be known, a line each."""
-    forgotten = [
-        f"{cohort.cases_file.name} ({case.case}): has {' and '.join(marks)} but no view, so that nothing is predicted; "
-        "add its mammograms to the table of views"
+    odd = [
+        f"{cohort.cases_file.name} ({case.case}): {what}"
         for case in cohort.cases.values()
-        if not cohort.views(case.case)
-        and (marks := [c for c in ("mr_lesion", "mr_landmarks") if getattr(case, c) is not None])
+        for what in _odd(cohort, case)
     ]
     return [
-        *forgotten,
+        *odd,
         *(f"{where}: {note}" for where, choice in _mr_choices(cohort) for note in choice.notes),
     ]
 
@@ -71,6 +78,20 @@ def _mr_choices(cohort: Cohort) -> Iterator[tuple[str, MrChoice]]:
                 yield f"{cohort.cases_file.name} ({case.case}), column {column}", choice
 
 
+def _odd(cohort: Cohort, case: CaseRow) -> Iterator[str]:
+    marks = [column for column in ("mr_lesion", "mr_landmarks") if getattr(case, column) is not None]
+    if marks and not cohort.views(case.case):
+        yield (
+            f"has {' and '.join(marks)} but no view, so that nothing is predicted; "
+            "add its mammograms to the table of views"
+        )
+    if case.mr_lesion is not None and is_list(case.mr_lesion) and (names := without_diameter(case.mr_lesion)):
+        yield (
+            f"mr_lesion gives {', '.join(names)} no diameter, and {UNKNOWN_DIAMETER_MM:g} mm is taken; "
+            "write it into the point's description, or draw a line or closed curve"
+        )
+
+
 class _Checked:
     """The files of one row that are there, and the checks of their contents."""
 
@@ -84,29 +105,33 @@ class _Checked:
         series = case.values().get("mr_series", "")
         yield from self._fault("mr", lambda path: _check_mr(path, case.laterality, series))
         yield from self._fault("mr_compressed", lambda path: _check_mr(path, case.laterality))
-        mr = partial(self._mr_grid, case.laterality, series)
-        yield from self._fault("mr_lesion", lambda path: _check_mr_lesion(path, mr()))
+        mr = partial(self._grid, "mr", case.laterality, series)
+        compressed = partial(self._grid, "mr_compressed", case.laterality)
+        yield from self._fault("mr_lesion", lambda path: check_mr_lesion(path, mr()))
         yield from self._fault("mr_labels", lambda path: _check_labels(path, mr()))
         for column in ("mr_landmarks", "mr_surface_points"):
-            yield from self._fault(column, read_points)
+            yield from self._fault(column, lambda path: check_mr_points(path, mr()))
+        for column in ("mr_compressed_landmarks", "mr_compressed_surface_points"):
+            yield from self._fault(column, lambda path: check_mr_points(path, compressed()))
         for column, partner in (
             ("mr_compressed_landmarks", case.mr_landmarks),
             ("mr_compressed_surface_points", case.mr_surface_points),
         ):
-            yield from self._fault(column, partial(_check_same_names, partner=partner))
+            yield from self._fault(column, partial(check_same_names, partner=partner))
 
     def view_faults(self, view: ViewRow, laterality: Any) -> Iterator[Fault]:
         yield from self._missing_faults()
         yield from self._fault("image", lambda p: _check_image(p, view, laterality))
-        yield from self._fault("lesion", lambda p: _check_view_lesion(p, self.files.get("image")))
-        yield from self._fault("landmarks", read_pixels)
+        size = partial(_size_of, self.files.get("image"))
+        yield from self._fault("lesion", partial(check_view_lesion, size=size))
+        yield from self._fault("landmarks", partial(check_view_landmarks, size=size))
 
-    def _mr_grid(self, side: Laterality, series: str) -> MrGrid | None:
-        """Grid of the case's MR volume; None where it has a fault, which is listed already."""
-        if "mr" not in self.files or "mr" in self.missing:
+    def _grid(self, column: str, side: Laterality, series: str = "") -> MrGrid | None:
+        """Grid of a column's MR volume; None where there is none, or it has a fault, which is listed already."""
+        if column not in self.files or column in self.missing:
             return None
         try:
-            return read_mr_grid(self.files["mr"], side, series)
+            return read_mr_grid(self.files[column], side, series)
         except DataError:
             return None
 
@@ -131,53 +156,18 @@ def _check_mr(path: Path, side: Laterality, series: str = "") -> None:
     check_whole_mr(path, side, series)
 
 
-def _check_mr_lesion(path: Path, mr: MrGrid | None) -> None:
-    if path.suffix == ".tsv":
-        read_spheres(path)
-        return
-    _check_mask_name(path)
-    _check_same_grid(path, mr)
-    read_mask(path)
-
-
 def _check_labels(path: Path, mr: MrGrid | None) -> None:
-    _check_mask_name(path)
-    _check_same_grid(path, mr)
-    import nibabel
-
-    try:
-        image: Any = nibabel.load(path)
-        found = np.unique(np.asanyarray(image.dataobj))
-    except (OSError, EOFError, ValueError) as error:
-        raise DataError(f"{path}: cannot be read; export the labels again") from error
-    if strange := [f"{value:g}" for value in found if value not in LABELS]:
+    if not is_nifti(path):
+        raise DataError(f"{path}: is not NIfTI; give .nii.gz")
+    check_same_grid(path, mr)
+    found = np.unique(read_labels(path).data)
+    if strange := [f"{value:.9g}" for value in found if value not in LABELS]:
         listed = ", ".join(strange[:5])
         raise DataError(
             f"{path}: holds the labels {listed}; known are 0 background, 1 fat, 2 gland, 3 skin, 4 muscle/chest wall"
         )
     if not {1, 2} & set(found.tolist()):
         raise DataError(f"{path}: labels neither fat (1) nor gland (2); give the breast's tissues or leave it empty")
-
-
-def _check_mask_name(path: Path) -> None:
-    if not is_nifti(path):
-        raise DataError(f"{path}: is not NIfTI; give .nii.gz (for a lesion also a .tsv with name x y z diameter_mm)")
-
-
-def _check_same_grid(path: Path, mr: MrGrid | None) -> None:
-    grid = read_mr_grid(path)
-    if mr is not None and not grid.same_as(mr):
-        raise DataError(f"{path}: lies on another grid ({grid}) than mr ({mr}); resample it onto the MR grid")
-
-
-def _check_same_names(path: Path, partner: Path | None) -> None:
-    names = set(read_points(path))
-    try:
-        others = set(read_points(partner)) if partner and partner.exists() else names
-    except DataError:
-        return
-    if not names & others:
-        raise DataError(f"{path}: shares no name with {partner}; give corresponding points the same names")
 
 
 def _check_image(path: Path, view: ViewRow, laterality: Any) -> None:
@@ -188,20 +178,12 @@ def _check_image(path: Path, view: ViewRow, laterality: Any) -> None:
     (check_whole_picture if is_picture(path) else check_whole_dicom)(path)
 
 
-def _check_view_lesion(path: Path, image: Path | None) -> None:
-    if path.suffix == ".tsv":
-        read_discs(path)
-        return
-    mask = read_image_mask(path)
+def _size_of(image: Path | None) -> tuple[int, int] | None:
+    """Rows and columns of a mammogram; None without one, or where it has a fault of its own."""
     try:
-        size = _image_size(image) if image and image.exists() else mask.shape
+        return _image_size(image) if image and image.exists() else None
     except DataError:
-        return
-    if mask.shape != size:
-        raise DataError(
-            f"{path}: the mask has {mask.shape[0]} x {mask.shape[1]} pixels (rows x columns), "
-            f"its mammogram {image} {size[0]} x {size[1]}; draw it on the image as stored"
-        )
+        return None
 
 
 def _image_size(path: Path) -> tuple[int, int]:

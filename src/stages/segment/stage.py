@@ -9,7 +9,7 @@ from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
 from mammoreg.labels import Label
 from stages.bias import n4_field
-from stages.cohort.readers.mr import mr_choice, read_mr, read_nifti
+from stages.cohort.readers.mr import mr_choice, read_labels, read_mr
 from stages.cohort.readers.mr_choice import MrChoice
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.segment.record import segment_fields
@@ -58,7 +58,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     side = subject.laterality
     series = subject.row.get("mr_series", "")
     mr, choice = read_mr(mr_path, side, series), mr_choice(mr_path, side, series)
-    labels = None if labels_path is None else read_nifti(labels_path)
+    labels = None if labels_path is None else read_labels(labels_path)
     if labels is not None and not _same_grid(mr, labels):
         raise DataError("mr_labels lies on another grid than mr; resample it onto the MR grid")
     choices = SegmentSettings(settings.spacing_mm, _back_settings(settings))

@@ -14,6 +14,9 @@ from stages.cohort.readers.mr_folder import choose_mr
 from stages.cohort.readers.mr_header import is_mr_dicom, read_mr_grid
 from stages.cohort.readers.mr_voxels import stack_voxels
 
+LABEL_ROUNDING = 1e-3
+"""A header's scale factor may take labels off whole numbers by this much."""
+
 
 def read_mr(path: Path, side: Laterality | None = None, series: str = "") -> Volume:
     """Read the intensities of an MR volume, LPS mm, float32; oblique ones are resampled, 0 outside.
@@ -53,6 +56,19 @@ def read_nifti(path: Path) -> Volume:
     read_mr_grid(path)
     data, affine = _nifti_voxels(path)
     return volume_of_affine(data, affine, order=0)
+
+
+def read_labels(path: Path) -> Volume:
+    """Read a map of whole labels, LPS mm; what differs from them by rounding alone is rounded.
+
+    Raises:
+        DataError: as `read_nifti`.
+    """
+    volume = read_nifti(path)
+    if volume.data.dtype.kind != "f":
+        return volume
+    whole = np.rint(volume.data)
+    return volume.with_data(np.where(np.abs(volume.data - whole) < LABEL_ROUNDING, whole, volume.data))
 
 
 def _nifti_voxels(path: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:

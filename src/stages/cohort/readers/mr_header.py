@@ -38,12 +38,24 @@ class MrGrid:
     spacing: tuple[float, ...]
     corners: NDArray[np.float64]
 
+    def shift_to(self, other: "MrGrid") -> NDArray[np.float64] | None:
+        """By how much (3,), mm, the other lies off, where both have the same voxels but for that; else None."""
+        shift = other.corners.mean(axis=0) - self.corners.mean(axis=0)
+        moved = MrGrid(self.shape, self.spacing, self.corners + shift)
+        return shift if moved.same_as(other) else None
+
     def same_as(self, other: "MrGrid") -> bool:
         """Whether both have the same voxels, however their axes are ordered or turned round."""
         if sorted(self.shape) != sorted(other.shape):
             return False
         distances = np.linalg.norm(self.corners[:, None] - other.corners[None], axis=2)
         return bool(distances.min(axis=1).max() < _SAME_PLACE_MM)
+
+    def index(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Fractional voxel indices (..., 3) of points (..., 3), LPS mm."""
+        last = np.array(self.shape) - 1
+        along = (self.corners[[4, 2, 1]] - self.corners[0]) / last[:, None]
+        return np.asarray((points - self.corners[0]) @ np.linalg.inv(along))
 
     def __str__(self) -> str:
         size = " x ".join(str(n) for n in self.shape)
