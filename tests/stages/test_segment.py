@@ -1,6 +1,7 @@
 """Stage `segment` from files to fields."""
 
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Literal
 
@@ -8,14 +9,21 @@ import nibabel
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from pydicom import dcmread
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from stages.cohort.readers.mr import read_nifti
+from stages.cohort.series import series_token
+from stages.digital.dicom import mr_dicom
 from stages.engine.artefact import Artefact, write_artefact
 from stages.engine.contract import Fields, Inputs, Subject
+from stages.engine.run import run_stage
+from stages.report.case import case_page
 from stages.segment.stage import Settings, run
 from tests.shared_data import DATA, requires_shared
+from tests.stages.mr_series import series
+from tests.stages.mr_series import write as write_slices
 from tests.stages.synthetic_case import header
 from tests.stages.xarray_volumes import check_volumes
 from tests.unit.torso_phantom import RIGHT, torso
@@ -127,3 +135,35 @@ def test_real_breasts(mr: str, side: Literal["L", "R"], suppressed: bool, nipple
 
 def dice(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
     return float(2.0 * (one & other).sum() / (one.sum() + other.sum()))
+
+
+def test_series_of_a_folder_stand_in_the_artefact_and_on_the_page_without_identifiers(tmp_path: Path) -> None:
+    """A patient's folder gives what its fitting series alone gives, and says which that was and what was left."""
+    fit = mr_dicom(torso().to_breast("R"), Subject("a"))
+    (tmp_path / "MR" / "S1").mkdir(parents=True)
+    for number, content in enumerate(fit):
+        (tmp_path / "MR" / "S1" / f"IM{number}").write_bytes(content)
+    example = dcmread(BytesIO(fit[0]))
+    patient = {"PatientID": example.PatientID, "StudyInstanceUID": example.StudyInstanceUID}
+    write_slices(tmp_path / "MR" / "S7", series("t1_sub", SeriesNumber=7, **patient))
+    row = {"mr_series": series_token(example.SeriesInstanceUID)}
+    for name, given in (("folder", {}), ("named", row)):
+        fields = run_stage(
+            "segment",
+            {"mr": tmp_path / "MR"},
+            tmp_path / f"{name}.h5",
+            {"spacing_mm": 2.0},
+            Subject("a", "R", row=given),
+        )
+        assert fields.status == "ok", fields.message
+    (section,) = case_page("a", "R", [Artefact(tmp_path / "folder.h5")]).sections
+    assert section.rows[0][0].startswith("series 1, ")
+    assert section.rows[0][1] == "taken"
+    assert (section.rows[1][0][:8], section.rows[1][1]) == ("series 7", "subtraction")
+    for name in ("folder", "named"):
+        content = (tmp_path / f"{name}.h5").read_bytes()
+        secrets = (example.SeriesInstanceUID, example.SOPInstanceUID, "DIGITAL-A", "t1_sub")
+        assert not any(secret.encode() in content for secret in secrets)
+    alone = segment({"mr": tmp_path / "MR" / "S1"})
+    mask = Artefact(tmp_path / "folder.h5").volume("breast_mask")
+    assert np.array_equal(mask.data, alone.volumes["breast_mask"].volume.data)

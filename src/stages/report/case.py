@@ -13,6 +13,7 @@ from stages.figures.record import FiguresRecord
 from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
 from stages.localize.record import Predictions
+from stages.segment.record import SegmentRecord
 from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
 from stages.views import SECOND_VOLUME, view_order
 
@@ -74,7 +75,7 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
     found = [f"{row['view']}: {row['trust']}" for row in rows]
     found += _unknown_depths(artefacts)
     for artefact in artefacts:
-        for name in ("warnings", "flags"):
+        for name in ("warnings", "flags", "mr_series_notes"):
             remarks = artefact.value(name) if artefact.has(name) else []
             found += [
                 f"{artefact.view or artefact.stage}: {r}" for r in remarks if not any(r in text for text in found)
@@ -134,6 +135,10 @@ def _sections(artefacts: Sequence[Artefact]) -> list[Section]:
         _section("Lesion in the MR volume against the truth", TABLE_6, artefacts),
         section_of("Landmarks against the truth", _landmark_rows(artefacts)),
         _turned(_section("Pose and fit of each view", VIEWS, artefacts)),
+        section_of(
+            "MR series in the folder",
+            [row for a in artefacts if a.stage == "segment" and a.ok for row in SegmentRecord(a).mr_series],
+        ),
     ]
 
 

@@ -92,6 +92,15 @@ class SegmentRecord(Record):
         return None if mask is None else mask.to_breast(self.laterality)
 
     @property
+    def mr_series(self) -> list[dict[str, str]]:
+        """The MR series of a folder of DICOM files, a row each, first the one taken; empty where none was chosen."""
+        if not self.artefact.has("mr_series"):
+            return []
+        return [{"series": str(self.artefact.value("mr_series")), "": "taken"}] + [
+            {"series": row["series"], "": row["left because"]} for row in self.artefact.value("mr_series_left")
+        ]
+
+    @property
     def nipple_lps(self) -> Points:
         """Nipple (3,), mm."""
         return np.asarray(self.artefact.array("nipple", "mm"), dtype=float)
