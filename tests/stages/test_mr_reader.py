@@ -1,5 +1,7 @@
 """MR volumes from NIfTI and DICOM, in any orientation, and what is refused."""
 
+import gzip
+import struct
 from pathlib import Path
 
 import nibabel
@@ -14,6 +16,8 @@ from pydicom.uid import ExplicitVRLittleEndian, MRImageStorage, generate_uid
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume, volume_of_affine
 from stages.cohort.readers.mr import read_mr, read_nifti
+from stages.cohort.readers.mr_header import read_mr_grid
+from stages.cohort.readers.whole import check_whole_mr
 from tests.shared_data import DATA, requires_shared
 
 TO_RAS = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -100,6 +104,76 @@ def test_spoiled_nifti_is_refused(tmp_path: Path, name: str, change: object, mes
         path.write_bytes(raw)
     with pytest.raises(DataError, match=message):
         read_mr(path)
+
+
+HEADERS = {
+    "vox_offset below the header": ("<f", 108, 348.0, "cannot be read as NIfTI"),
+    "unknown data type": ("<h", 70, 1, "cannot be read as NIfTI"),
+    "dimensions without end": ("<h", 42, 30000, "30000 x 10 x 10 voxels of 1 x 1 x 1 mm are no breast volume"),
+    "no dimension": ("<h", 42, 0, "cannot be read as NIfTI|0 x 10 x 10"),
+    "negative dimension": ("<h", 42, -10, "-10 x 10 x 10 voxels, which is no volume"),
+    "spacing of pixdim ten times that of the affine": (
+        "<f",
+        80,
+        10.0,
+        "two voxel spacings, 10 x 1 x 1 and 1 x 1 x 1 mm",
+    ),
+    "spacing that is no number": ("<f", 80, float("nan"), "voxel spacing is nan"),
+    "affine that is no number": ("<f", 280, float("nan"), "nan"),
+    "flat affine": ("<f", 280 + 20, 0.0, "spacing"),
+    "colours": ("<h", 70, 128, "not grey values|cannot be read"),
+    "wrong magic": ("4s", 344, b"abc\0", "cannot be read as NIfTI"),
+}
+
+
+@pytest.mark.parametrize(("form", "offset", "value", "message"), HEADERS.values(), ids=HEADERS.keys())
+@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
+def test_headers_that_nibabel_refuses_in_its_own_ways(
+    tmp_path: Path, suffix: str, form: str, offset: int, value: object, message: str
+) -> None:
+    nibabel.save(nibabel.Nifti1Image(np.ones((10, 10, 10), np.float32), np.eye(4)), tmp_path / "mr.nii")
+    raw = bytearray((tmp_path / "mr.nii").read_bytes())
+    struct.pack_into(form, raw, offset, value)
+    path = tmp_path / f"spoilt{suffix}"
+    path.write_bytes(gzip.compress(bytes(raw)) if suffix == ".nii.gz" else bytes(raw))
+    with pytest.raises(DataError, match=message):
+        read_mr_grid(path)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 0.999])
+def test_damage_in_a_compressed_volume_is_no_traceback(tmp_path: Path, share: float) -> None:
+    path = tmp_path / "mr.nii.gz"
+    nibabel.save(nibabel.Nifti1Image(np.random.default_rng(0).random((12, 12, 12)), np.eye(4)), path)
+    raw = bytearray(path.read_bytes())
+    start = int(share * (len(raw) - 40))
+    raw[start : start + 40] = bytes(40)
+    path.write_bytes(bytes(raw))
+
+    def looked_at() -> None:
+        read_mr_grid(path)
+        check_whole_mr(path)
+
+    with pytest.raises(DataError, match="mr.nii.gz"):
+        looked_at()
+
+
+def test_several_volumes_in_one_file_are_refused_by_name(tmp_path: Path) -> None:
+    nibabel.save(nibabel.Nifti1Image(np.ones((10, 10, 10, 4), np.float32), np.eye(4)), tmp_path / "mr.nii")
+    with pytest.raises(
+        DataError, match="holds several volumes .10 x 10 x 10 x 4 voxels.; write the one before contrast"
+    ):
+        read_mr_grid(tmp_path / "mr.nii")
+
+
+def test_a_scale_factor_that_is_no_number_means_none(tmp_path: Path) -> None:
+    """NIfTI: a slope of 0 or NaN leaves the stored values as they are."""
+    nibabel.save(
+        nibabel.Nifti1Image(np.arange(1000, dtype=np.int16).reshape(10, 10, 10), np.eye(4)), tmp_path / "a.nii"
+    )
+    raw = bytearray((tmp_path / "a.nii").read_bytes())
+    struct.pack_into("<f", raw, 112, float("nan"))
+    (tmp_path / "b.nii").write_bytes(bytes(raw))
+    assert np.array_equal(read_mr(tmp_path / "b.nii").data, read_mr(tmp_path / "a.nii").data)
 
 
 def test_truncated_nifti_is_refused(tmp_path: Path) -> None:

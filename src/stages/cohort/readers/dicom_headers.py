@@ -1,5 +1,6 @@
 """DICOM files of a folder, and values of their headers of which only sound ones count."""
 
+import logging
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,9 @@ from pydicom.uid import MediaStorageDirectoryStorage
 
 from mammoreg.errors import DataError
 from stages.cohort.readers import header_values
+
+# What it remarks of odd files is for programmers; what matters is said by the readers.
+logging.getLogger("pydicom").setLevel(logging.ERROR)
 
 _PREAMBLE = 128
 _HEADS = (b"\x08\x00", b"\x02\x00")

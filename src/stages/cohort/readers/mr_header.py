@@ -98,11 +98,13 @@ def read_mr_grid(path: Path, side: Laterality | None = None, series: str = "") -
 
 def _nifti_affine(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
     import nibabel
+    from nibabel.imageglobals import LoggingOutputSuppressor
 
     try:
-        image: Any = nibabel.load(path)
+        with LoggingOutputSuppressor():
+            image: Any = nibabel.load(path)
+            stored = _stored_header(path, type(image.header))
         shape, affine, kind = image.shape, image.affine, image.get_data_dtype()
-        stored = _stored_header(path, type(image.header))
         zooms = np.asarray(stored["pixdim"][1:4], dtype=float)
         placed = int(stored["sform_code"]) != 0 or int(stored["qform_code"]) != 0
     except Exception as error:  # nibabel has exceptions of its own for each part of a header
