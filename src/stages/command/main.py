@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from mammoreg.errors import DataError
 from stages.command.by_hand import HelpFormatter, add_check, add_export, add_show, add_stage
+from stages.command.importing import add_import
 from stages.command.one_case import add_case
 from stages.command.running import add_run
 from stages.engine.errors import UserError
@@ -18,6 +19,7 @@ from stages.engine.threads import compute_with_one_thread
 DESCRIPTION = "Find in X-ray mammograms the lesions marked in a breast MR volume, and the other way round."
 EPILOG = """examples:
   mammoreg run                                  the embedded cohort of digital patients
+  mammoreg import export my_cohort              tables of a folder of DICOM files from a PACS
   mammoreg check cases.tsv views.tsv            look at a cohort without running it
   mammoreg run cases.tsv views.tsv --results my_results
   mammoreg case --mr mr.nii.gz --laterality R --cc cc.dcm --mr-lesion lesion.nii.gz
@@ -35,6 +37,7 @@ def mammoreg_parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     add_run(commands)
     add_case(commands)
+    add_import(commands)
     add_check(commands, "mammoreg")
     add_stage(commands, "stage", "mammoreg")
     add_show(commands, "mammoreg")
