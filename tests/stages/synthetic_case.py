@@ -56,7 +56,11 @@ def write_segment(path: Path, laterality: Laterality, compressed: bool = False) 
         np.meshgrid(*(o + s * np.arange(k) for o, s, k in zip(origin, spacing, n, strict=True)), indexing="ij"), axis=-1
     )
     inside = (np.abs(grid[..., [0, 2]]) < HALF_WIDTH).all(-1) & (grid[..., 1] < 0) & (grid[..., 1] > -DEPTH)
-    volumes = {"breast_mask": Volume(inside.astype(np.uint8), origin, spacing)}
+    labels = np.where(grid[..., 1] < 0, inside, 4)
+    volumes = {
+        "breast_mask": Volume(inside.astype(np.uint8), origin, spacing),
+        "labels": Volume(labels.astype(np.uint8), origin, spacing),
+    }
     side = np.linspace(-HALF_WIDTH, HALF_WIDTH, 31)
     wall = np.stack([*np.meshgrid(side, side, indexing="ij"), np.zeros((31, 31))], axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
     if compressed:

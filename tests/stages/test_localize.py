@@ -1,6 +1,7 @@
 """Stage `localize` on a breast whose compression is known in closed form."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,18 @@ from PIL import Image
 
 from mammoreg.geometry import breast_to_lps, plate_to_breast
 from mammoreg.geometry.frames import Laterality
+from mammoreg.localization.lesions import LesionArea, area_from_disc
+from mammoreg.metrics.distances import breast_scale_mm
 from stages.engine.artefact import Artefact, Fields, write_artefact
 from stages.engine.contract import Subject
 from stages.engine.run import run_stage
+from stages.localize.strays import strays_in_mammogram
 from stages.methods import METHODS
 from tests.stages import synthetic_case as synthetic
 from tests.stages.xarray_volumes import check_volumes
 
 LESION = np.array([12.0, -40.0, 9.0])
-POINTS = {"p1": np.array([-20.0, -30.0, 15.0]), "p2": np.array([5.0, -60.0, -25.0]), "deep": np.array([0.0, 60.0, 0.0])}
+POINTS = {"p1": np.array([-20.0, -30.0, 15.0]), "p2": np.array([5.0, -60.0, -25.0]), "deep": np.array([0.0, 12.0, 0.0])}
 
 
 def write_tsv(path: Path, columns: str, rows: dict[str, Any]) -> Path:
@@ -144,6 +148,83 @@ def test_directions_do_not_read_each_others_marks(both_ways: Artefact, tmp_path:
     assert only_mr.value("mr_rows") == []
     assert only_views.value("mr_rows") == both_ways.value("mr_rows")
     assert only_views.value("mammogram_rows") == only_views.value("compressed_rows") == []
+
+
+def _marked_at(folder: Path, lps: np.ndarray, diameter_mm: float = 10.0) -> dict[str, Path]:
+    """The lesion called mass at a place, and one called sound where it belongs."""
+    lesions = {"mass": [*lps, diameter_mm], "sound": [*LESION, 10.0]}
+    return {"mr_lesion": write_tsv(folder / "strays.tsv", "name x y z diameter_mm", lesions)}
+
+
+@pytest.mark.parametrize(
+    ("lps", "says"),
+    [
+        (
+            LESION * [-1.0, -1.0, 1.0],
+            "breast, 41 mm from the R breast's model; with x and y negated it lies inside (RAS",
+        ),
+        (np.array([10.0, -40.0, 80.0]), "37 mm from the R breast's model; check its frame and the laterality"),
+        (np.array([75.0, -40.0, 0.0]), "from the R breast's model, towards the other breast"),
+        (np.array([0.0, -74.9, 0.0]), "marked in the air or outside the breast, 6 mm from the R breast"),
+    ],
+)
+def test_a_lesion_marked_outside_the_breast_is_flagged(tmp_path: Path, lps: np.ndarray, says: str) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    rows = {
+        r["name"]: r
+        for r in rows_of(localized(inputs | _marked_at(tmp_path, lps), tmp_path / "l.h5"), "mammogram_rows")
+    }
+    assert says in rows["mass"]["message"]
+    assert (rows["sound"]["seen"], rows["sound"]["message"]) == (True, "")
+
+
+def test_nothing_is_predicted_for_what_is_far_from_the_breast(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",), compressed=True)
+    marks = _marked_at(tmp_path, np.array([110.0, -40.0, 0.0]))
+    far = {"far": [110.0, -40.0, 0.0], "near": [*POINTS["p1"]]}
+    marks["mr_landmarks"] = write_tsv(tmp_path / "far.tsv", "name x y z", far)
+    found = localized(inputs | marks, tmp_path / "localize.h5")
+    rows = {row["name"]: row for row in rows_of(found, "mammogram_rows")}
+    assert {name: row["seen"] for name, row in rows.items()} == {
+        "mass": False, "sound": True, "far": False, "near": True,
+    }  # fmt: skip
+    assert "67 mm from the R breast's model, towards the other breast" in rows["mass"]["message"]
+    carried = {row["name"]: row for row in rows_of(found, "compressed_rows")}
+    assert carried["far"]["x"] is None
+    assert "67 mm from" in carried["far"]["message"]
+    assert carried["near"]["x"] is not None
+
+
+def test_a_lesion_that_fills_the_breast_is_refused(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    marks = _marked_at(tmp_path, np.array([0.0, -35.0, 0.0]), diameter_mm=95.0)
+    rows = {r["name"]: r for r in rows_of(localized(inputs | marks, tmp_path / "l.h5"), "mammogram_rows")}
+    assert not rows["mass"]["seen"]
+    assert "of it), more than any lesion; mark it alone" in rows["mass"]["message"]
+    assert rows["sound"]["seen"]
+
+
+def test_lesions_marked_in_the_air_of_a_mammogram() -> None:
+    tissue = np.zeros((200, 100), np.uint8)
+    tissue[20:150, :40] = 1
+    pose: Any = SimpleNamespace(tissue=tissue, geometry=synthetic.geometry("CC"), view="CC")
+    mm_px = breast_scale_mm(pose.geometry)
+    areas = {
+        "in": area_from_disc(20, 60, 10),
+        "edge": area_from_disc(39 + 10 / mm_px, 60, 10),
+        "far": area_from_disc(90, 60, 10),
+        "below": area_from_disc(20, 190, 10),
+        "all": LesionArea(np.ones((120, 38), bool), (1, 25)),
+    }
+    found = strays_in_mammogram(areas, pose)
+    assert {name: stray.refused for name, stray in found.items()} == {
+        "edge": False, "far": 51 * mm_px > 15, "below": 41 * mm_px > 15, "all": True,
+    }  # fmt: skip
+    assert "marked in the air or outside the breast, 10 mm from it in CC" in found["edge"].message
+    assert "mirrored left to right it lies inside: mark it on the image as stored" in found["far"].message
+    assert "turned by 180 degrees" not in found["below"].message
+    assert "turned upside down it lies inside" not in found["below"].message
+    assert "fills the breast (88% of it)" in found["all"].message
 
 
 def write_mask(path: Path, size: tuple[int, int], flips: tuple[bool, bool] = (False, False)) -> Path:

@@ -11,6 +11,10 @@ from mammoreg.geometry import Volume
 from mammoreg.localization.lesions import LesionArea
 from stages.engine.artefact import Array, Artefact, Fields, VolumeField
 
+STRAY = "marked in the air or outside the breast"
+FILLING = "the lesion fills the breast"
+"""What messages say of marks that cannot be what they are said to be."""
+
 
 @dataclass(frozen=True)
 class MammogramRow:
@@ -19,7 +23,7 @@ class MammogramRow:
     Attributes:
         column, row: pixel of the stored image; None where nothing is seen.
         radius_mm: of the region that holds it with 95 %.
-        message: why there is no place.
+        message: why there is no place, or what speaks against the mark.
     """
 
     view: str
@@ -76,7 +80,7 @@ class CompressedRow:
 
     Attributes:
         x, y, z: LPS, mm; None where there is no point.
-        message: why there is none.
+        message: why there is none, or what speaks against the mark.
     """
 
     method: str

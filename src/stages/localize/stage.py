@@ -14,6 +14,7 @@ from stages.engine.artefact import Artefact, Fields
 from stages.engine.completion import first_failure
 from stages.engine.contract import Failure, Inputs, NoSettings, Stage, Subject, Value
 from stages.localize.record import compressed_fields, mammogram_fields, mr_fields
+from stages.localize.strays import Stray, filling, strays_in_mammogram, strays_in_mr
 from stages.localize.to_compressed import missing_in_compressed, predict_in_compressed
 from stages.localize.to_mammogram import missing_in_mammograms, predict_in_mammograms
 from stages.localize.to_mr import UndeformedBreast, missing_in_mr, predict_in_mr
@@ -37,25 +38,31 @@ def run(inputs: Inputs, settings: NoSettings, subject: Subject) -> Fields:
     solutions = [a for a in per_view if a.stage != "pose"]
     views = case_views(poses, solutions, mesh.reference)
     parts = [
-        _to_mammograms(inputs, views, segment.laterality),
+        _to_mammograms(inputs, views, segment),
         _to_mr(inputs, views, segment, mesh.block.skin_points(_SKIN_PARTS)),
         _to_compressed(inputs, views, segment, mesh.block),
     ]
     return _joined(parts, per_view)
 
 
-def _to_mammograms(inputs: Inputs, views: CaseViews, laterality: Laterality) -> Fields:
+def _to_mammograms(inputs: Inputs, views: CaseViews, segment: SegmentRecord) -> Fields:
     """Reads `mr_lesion` and `mr_landmarks` alone."""
-    lesions = mr_lesions(inputs).items()
-    bodies = {name: lesion.to_breast(laterality).body() for name, lesion in lesions}
-    return predict_in_mammograms(views, bodies, _landmarks(inputs, laterality))
+    laterality = segment.laterality
+    lesions = {name: lesion.to_breast(laterality) for name, lesion in mr_lesions(inputs).items()}
+    landmarks, breast = _landmarks(inputs, laterality), segment.breast_mask
+    strays = _strays({name: lesion.centre for name, lesion in lesions.items()} | landmarks, segment)
+    strays |= filling(lesions, breast)
+    bodies = {name: lesion.body() for name, lesion in lesions.items()}
+    return predict_in_mammograms(views, bodies, landmarks, strays)
 
 
 def _to_mr(inputs: Inputs, views: CaseViews, segment: SegmentRecord, skin: Points) -> Fields:
     """Reads the views' `lesion` alone."""
     anatomy = UndeformedBreast(segment.laterality, segment.breast_mask, segment.nipple, skin, segment.chest_wall)
     names_of = {view: view_lesion_names(inputs, view) for view in views.imaged}
-    return predict_in_mr(views, anatomy, names_of, {v: view_areas(inputs, pose) for v, pose in views.poses.items()})
+    areas = {view: view_areas(inputs, pose) for view, pose in views.poses.items()}
+    strays = {view: strays_in_mammogram(areas[view], pose) for view, pose in views.poses.items() if pose.has_mammogram}
+    return predict_in_mr(views, anatomy, names_of, areas, strays)
 
 
 def _to_compressed(inputs: Inputs, views: CaseViews, segment: SegmentRecord, block: BlockMesh) -> Fields:
@@ -63,7 +70,12 @@ def _to_compressed(inputs: Inputs, views: CaseViews, segment: SegmentRecord, blo
     second = second_volume(segment, block)
     if second is None:
         return Fields()
-    return predict_in_compressed(views, second, _landmarks(inputs, segment.laterality), segment.laterality)
+    landmarks = _landmarks(inputs, segment.laterality)
+    return predict_in_compressed(views, second, landmarks, segment.laterality, _strays(landmarks, segment))
+
+
+def _strays(points: dict[str, Points], segment: SegmentRecord) -> dict[str, Stray]:
+    return strays_in_mr(points, segment.breast_mask, segment.labels, segment.laterality)
 
 
 def _landmarks(inputs: Inputs, laterality: Laterality) -> dict[str, Points]:

@@ -10,13 +10,18 @@ from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.to_compressed import SecondVolume, drawn_to_breast
 from stages.engine.artefact import Fields
 from stages.localize.record import CompressedRow, compressed_fields
+from stages.localize.strays import Stray
 from stages.localize.views import CaseViews
 from stages.methods import METHODS
 from stages.second_volume import view_in_second_volume
 
 
 def predict_in_compressed(
-    views: CaseViews, second: SecondVolume, landmarks: Mapping[str, Points], laterality: Laterality
+    views: CaseViews,
+    second: SecondVolume,
+    landmarks: Mapping[str, Points],
+    laterality: Laterality,
+    strays: Mapping[str, Stray],
 ) -> Fields:
     """Rows of the landmarks (LPS), and by how much each method is shifted.
 
@@ -27,17 +32,22 @@ def predict_in_compressed(
         views: of the case.
         second: what places results.
         landmarks: points (3,) of the undeformed volume by name, breast frame.
+        strays: by name, what speaks against a mark; nothing is predicted for the refused ones.
     """
+    refused = [name for name in landmarks if name in strays and strays[name].refused]
+    landmarks = {name: point for name, point in landmarks.items() if name not in refused}
     view = view_in_second_volume(views.methods)
     rows: list[CompressedRow] = []
     points = np.array(list(landmarks.values())).reshape(-1, 3)
     shifts = _shifts(views, view, second)
+    for name in refused:
+        rows += missing_in_compressed([name], strays[name].message)
     for method in METHODS if landmarks else ():
         carried = _carried(views, view, second, method, points, shifts)
         if carried is None:
             rows += missing_in_compressed(list(landmarks), _trouble(views, view, method), (method,))
         else:
-            rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality))
+            rows += _rows(method, list(landmarks), breast_to_lps(carried, laterality), strays)
     moved = {method: _drawn(views, str(view), method) + shift for method, shift in shifts.items()}
     return compressed_fields(rows, view, {method: breast_to_lps(shift, laterality) for method, shift in moved.items()})
 
@@ -83,5 +93,9 @@ def missing_in_compressed(names: Sequence[str], message: str, methods: Sequence[
     return [CompressedRow(method, name, message=message) for method in methods for name in names]
 
 
-def _rows(method: str, names: list[str], points: Points) -> list[CompressedRow]:
-    return [CompressedRow(method, name, *point.tolist()) for name, point in zip(names, points, strict=True)]
+def _rows(method: str, names: list[str], points: Points, strays: Mapping[str, Stray]) -> list[CompressedRow]:
+    rows = []
+    for name, point in zip(names, points, strict=True):
+        x, y, z = map(float, point)
+        rows.append(CompressedRow(method, name, x, y, z, strays[name].message if name in strays else ""))
+    return rows

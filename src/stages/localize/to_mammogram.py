@@ -11,6 +11,7 @@ from mammoreg.localization.lesions import LesionBody
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
 from stages.engine.artefact import Fields
 from stages.localize.record import AreaPrediction, MammogramRow, mammogram_fields
+from stages.localize.strays import Stray
 from stages.localize.views import CaseViews
 from stages.methods import METHODS
 from stages.pose.record import PoseRecord
@@ -19,7 +20,10 @@ UNSEEN = "outside the imaged part"
 
 
 def predict_in_mammograms(
-    views: CaseViews, bodies: Mapping[str, LesionBody], landmarks: Mapping[str, Points]
+    views: CaseViews,
+    bodies: Mapping[str, LesionBody],
+    landmarks: Mapping[str, Points],
+    strays: Mapping[str, Stray],
 ) -> Fields:
     """Rows `mammogram_rows` (pixels of the stored image), and the projected areas, canonical.
 
@@ -27,7 +31,10 @@ def predict_in_mammograms(
         views: of the case.
         bodies: lesions of the MR volume by name, breast frame.
         landmarks: points (3,) of the MR volume by name, breast frame.
+        strays: by name, what speaks against a mark; nothing is predicted for the refused ones.
     """
+    refused = {name for name, stray in strays.items() if stray.refused}
+    kept = {name: point for name, point in landmarks.items() if name not in refused}
     rows: list[MammogramRow] = []
     areas: list[AreaPrediction] = []
     for view in views.imaged:
@@ -36,12 +43,15 @@ def predict_in_mammograms(
                 rows += _missing(view, method, [*bodies, *landmarks], views.troubles[view, method])
                 continue
             pose, way = views.poses[view], views.methods[view][method]
-            for name, body in bodies.items():
+            rows += [
+                MammogramRow(view, method, n, message=strays[n].message) for n in (*bodies, *landmarks) if n in refused
+            ]
+            for name, body in ((n, b) for n, b in bodies.items() if n not in refused):
                 lesion = project_lesion(way, body)
-                rows.append(_row(pose, method, name, lesion.centre, lesion.seen))
+                rows.append(_row(pose, method, name, lesion.centre, lesion.seen, strays))
                 if lesion.area is not None:
                     areas.append(AreaPrediction(view, method, name, lesion.area))
-            rows += _landmark_rows(pose, method, way, landmarks)
+            rows += _landmark_rows(pose, method, way, kept, strays)
     return mammogram_fields(rows, areas, list(bodies))
 
 
@@ -56,14 +66,22 @@ def _missing(view: str, method: str, names: list[str], message: str) -> list[Mam
 
 
 def _landmark_rows(
-    pose: PoseRecord, method: str, way: MethodView, landmarks: Mapping[str, Points]
+    pose: PoseRecord, method: str, way: MethodView, landmarks: Mapping[str, Points], strays: Mapping[str, Stray]
 ) -> list[MammogramRow]:
     pixels, seen = project_landmarks(way, np.array(list(landmarks.values())).reshape(-1, 3))
-    return [_row(pose, method, n, p, bool(s)) for n, p, s in zip(landmarks, pixels, seen, strict=True)]
+    return [_row(pose, method, n, p, bool(s), strays) for n, p, s in zip(landmarks, pixels, seen, strict=True)]
 
 
-def _row(pose: PoseRecord, method: str, name: str, pixel: NDArray[np.float64], seen: bool) -> MammogramRow:
+def _row(
+    pose: PoseRecord,
+    method: str,
+    name: str,
+    pixel: NDArray[np.float64],
+    seen: bool,
+    strays: Mapping[str, Stray],
+) -> MammogramRow:
+    doubt = strays[name].message if name in strays else ""
     if not seen:
-        return MammogramRow(pose.view, method, name, message=UNSEEN)
+        return MammogramRow(pose.view, method, name, message="; ".join(filter(None, (UNSEEN, doubt))))
     column, row = map(float, pose.stored_pixels(pixel))
-    return MammogramRow(pose.view, method, name, column, row, seen=True)
+    return MammogramRow(pose.view, method, name, column, row, seen=True, message=doubt)

@@ -14,6 +14,7 @@ from mammoreg.localization.lesions import LesionArea
 from mammoreg.localization.to_mr import MrPrediction, locate_in_breast
 from stages.engine.artefact import Fields
 from stages.localize.record import MrRow, RegionPrediction, mr_fields
+from stages.localize.strays import Stray
 from stages.localize.views import CaseViews
 from stages.methods import METHODS
 
@@ -40,6 +41,7 @@ def predict_in_mr(
     anatomy: UndeformedBreast,
     names_of: Mapping[str, list[str]],
     areas: Mapping[str, Mapping[str, LesionArea]],
+    strays: Mapping[str, Mapping[str, Stray]],
 ) -> Fields:
     """Rows `mr_rows` (LPS), and per lesion and method the region and the curves.
 
@@ -48,6 +50,7 @@ def predict_in_mr(
         anatomy: of the undeformed breast.
         names_of: lesions that each view marks, views whose pose failed too.
         areas: lesions by view and name, canonical pixels, of the other views.
+        strays: by view and name, what speaks against a lesion's mark; a refused one is not used.
     """
     rows: list[MrRow] = []
     regions: list[RegionPrediction] = []
@@ -58,8 +61,14 @@ def predict_in_mr(
         seen = {view: BreastInView(way, grid) for view, way in offered.items()}
         for name in names:
             shown = [view for view in names_of if name in names_of[view]]
-            usable = {view: areas[view][name] for view in shown if view in seen}
+            doubts = {view: strays[view][name] for view in shown if name in strays.get(view, {})}
+            usable = {
+                view: areas[view][name]
+                for view in shown
+                if view in seen and not (view in doubts and doubts[view].refused)
+            }
             lost = list(dict.fromkeys(views.troubles.get((v, method), "") for v in shown if v not in seen))
+            lost += [doubt.message for doubt in doubts.values()]
             if not usable:
                 rows.append(MrRow("+".join(shown), method, name, message="; ".join(lost)))
                 continue

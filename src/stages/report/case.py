@@ -12,7 +12,7 @@ from stages.engine.completion import first_failures
 from stages.figures.record import FiguresRecord
 from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
-from stages.localize.record import Predictions
+from stages.localize.record import FILLING, STRAY, Predictions
 from stages.segment.record import SegmentRecord
 from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
 from stages.views import SECOND_VOLUME, view_order
@@ -73,7 +73,7 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
     """What speaks against the full registration, and what stages remarked."""
     rows = [row for row in VIEWS.rows(artefacts) if row["method"] == SHOWN_METHOD and row.get("trust")]
     found = [f"{row['view']}: {row['trust']}" for row in rows]
-    found += _unknown_depths(artefacts)
+    found += [*_unknown_depths(artefacts), *_stray_marks(artefacts)]
     for artefact in artefacts:
         for name in ("warnings", "flags", "mr_series_notes"):
             remarks = artefact.value(name) if artefact.has(name) else []
@@ -87,6 +87,17 @@ def _unknown_depths(artefacts: Sequence[Artefact]) -> list[str]:
     """Lesions that one view alone shows."""
     rows = [row for row in PREDICTIONS_MR.rows(artefacts) if row["method"] == SHOWN_METHOD]
     return [f"{row['views']}, {row['name']}: {row['message']}" for row in rows if DEPTH_UNKNOWN in row["message"]]
+
+
+def _stray_marks(artefacts: Sequence[Artefact]) -> list[str]:
+    """Marks that do not lie in the breast."""
+    tables = ((PREDICTIONS_MAMMOGRAM, "view"), (PREDICTIONS_MR, "views"))
+    return [
+        f"{row[column]}, {row['name']}: {row['message']}"
+        for table, column in tables
+        for row in table.rows(artefacts)
+        if row["method"] == SHOWN_METHOD and (STRAY in row["message"] or FILLING in row["message"])
+    ]
 
 
 def _headline(artefacts: Sequence[Artefact]) -> list[tuple[str, str]]:
