@@ -1,7 +1,7 @@
 """Lesion polygons of MIMBCD-UI's `dataset-uta11-findings` as marks of an imported cohort.
 
     mammoreg import dataset-uta11-dicom/dataset my_cohort --with-paths
-    python examples/uta11_marks.py dataset-uta11-dicom/dataset my_cohort dataset-uta11-findings/dataset
+    python examples/uta11_marks.py dataset-uta11-dicom/dataset my_cohort dataset-uta11-findings
 
 Each JSON file lists the polygons of one study by stack. A stack names its images by a digest of their identifiers; the
 images are looked for in the export, so that a polygon on a slice of any MR series finds its place in the patient.
@@ -258,12 +258,14 @@ def write_marks(
         mine = {view: found for (owner, view), found in discs.items() if owner == case["case"]}
         spheres = balls.get(case["case"], [])
         alone = all(len(found) <= 1 for found in (spheres, *mine.values()))
+        balls_cells = [_cells("x y z diameter_mm", (*ball.centre, ball.diameter_mm)) for ball in spheres]
         if spheres:
             case["mr_lesion"] = f"marks/{case['case']}_mr.tsv"
-            write_table(cohort / case["mr_lesion"], _named(sphere_cells(spheres), alone, "mr"))
+            write_table(cohort / case["mr_lesion"], _named(balls_cells, alone, "mr"))
         for row in (row for row in views if row["case"] == case["case"] and row["view"] in mine):
+            discs_cells = [_cells("column row diameter_mm", disc) for disc in mine[row["view"]]]
             row["lesion"] = f"marks/{row['case']}_{row['view']}.tsv"
-            write_table(cohort / row["lesion"], _named(disc_cells(mine[row["view"]]), alone, row["view"].lower()))
+            write_table(cohort / row["lesion"], _named(discs_cells, alone, row["view"].lower()))
     write_table(cohort / "cases.tsv", cases)
     write_table(cohort / "views.tsv", views)
 
@@ -272,18 +274,8 @@ def _named(rows: Sequence[Mapping[str, str]], alone: bool, prefix: str) -> list[
     return [{"name": name} | dict(row) for name, row in zip(names(len(rows), alone, prefix), rows, strict=True)]
 
 
-def sphere_cells(balls: Sequence[Ball]) -> list[dict[str, str]]:
-    """Lesions in MR as cells of a table."""
-    return [_cells(("x", "y", "z", "diameter_mm"), (*ball.centre, ball.diameter_mm)) for ball in balls]
-
-
-def disc_cells(discs: Sequence[Disc]) -> list[dict[str, str]]:
-    """Lesions on a mammogram as cells of a table."""
-    return [_cells(("column", "row", "diameter_mm"), disc) for disc in discs]
-
-
-def _cells(columns: Sequence[str], values: Sequence[float]) -> dict[str, str]:
-    return {column: f"{value:.2f}" for column, value in zip(columns, values, strict=True)}
+def _cells(columns: str, values: Sequence[float]) -> dict[str, str]:
+    return {column: f"{value:.2f}" for column, value in zip(columns.split(), values, strict=True)}
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -293,8 +285,9 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("cohort", type=Path, help="what `mammoreg import --with-paths` made of it")
     parser.add_argument("findings", type=Path, help="folder of the JSON files")
     given = parser.parse_args(words)
-    files = sorted(given.findings.glob("*.json"))
-    polygons = [polygon for path in files for polygon in polygons_of(json.loads(path.read_text(encoding="utf-8")))]
+    read = (json.loads(path.read_text(encoding="utf-8")) for path in sorted(given.findings.rglob("*.json")))
+    files = [found for found in read if isinstance(found, dict) and "rawData" in found]
+    polygons = [polygon for found in files for polygon in polygons_of(found)]
     balls, discs = marks_of(headers_of(given.export), imported(given.cohort), polygons)
     write_marks(given.cohort, balls, discs)
     print(f"{len(polygons)} polygons of {len(files)} files")
