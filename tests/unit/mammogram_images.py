@@ -29,3 +29,18 @@ def with_pectoral(image: NDArray[np.float32]) -> NDArray[np.float32]:
     row, column = np.indices(image.shape)
     behind = column / 130.0 + (row - 120.0) / 280.0 < 1.0 + 0.0 * column
     return np.where(behind & (inside_share() < 1.0), image + 450.0, image).astype(np.float32)
+
+
+def with_glow(image: NDArray[np.float32], reach_mm: float = 25.0) -> NDArray[np.float32]:
+    """As an 8-bit export with scatter beside the breast: air that fades from a fifth of the range to nearly nothing."""
+    outside = np.clip(inside_share() - 1.0, 0.0, None) * DEPTH_MM
+    glow = 45.0 * np.exp(-outside / reach_mm)
+    grey = np.where(inside_share() < 1.0, 45.0 + (image - 40.0) * (200.0 / 900.0), glow)
+    return np.rint(np.clip(grey, 0.0, 255.0)).astype(np.float32)
+
+
+def fading_skin(air: float = 0.0) -> NDArray[np.float32]:
+    """An 8-bit export whose breast darkens towards the skin until two grey values are left, over air that is even."""
+    radius = inside_share()
+    inside = 2.0 + 200.0 * np.clip(1.0 - radius, 0.0, None) ** 1.5
+    return np.rint(air + np.where(radius < 1.0, inside, 0.0)).astype(np.float32)

@@ -12,7 +12,9 @@ from tests.unit.mammogram_images import (
     PIXEL_MM,
     SHAPE,
     breast_image,
+    fading_skin,
     inside_share,
+    with_glow,
     with_pectoral,
 )
 
@@ -29,6 +31,40 @@ def test_outline_of_an_ellipse_is_found_below_a_pixel():
     distance = _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0])
     assert distance.mean() < 0.15
     assert distance.max() < 0.4
+
+
+@pytest.mark.parametrize("reach_mm", [10.0, 25.0, 60.0])
+def test_outline_does_not_run_through_glowing_air(reach_mm):
+    found = analyse(with_glow(breast_image(), reach_mm), PIXEL_MM, "CC")
+    assert _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0]).max() < 0.6
+    assert 0.2 < found.step < 1.0
+    assert found.stepped_share == 1.0
+
+
+def test_outline_of_skin_that_fades_into_the_air_lies_at_its_foot():
+    found = analyse(fading_skin(), PIXEL_MM, "CC")
+    assert _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0]).max() < 0.6
+    assert 0.01 < found.step < 0.05
+
+
+def test_a_bright_column_of_the_detector_is_no_outline():
+    image = breast_image(noise=0.0)
+    image[:, 276] += 12.0
+    found = analyse(image, PIXEL_MM, "CC")
+    assert _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0]).max() < 0.6
+
+
+def test_air_without_a_step_to_the_breast_is_refused():
+    slope = (200.0 * np.exp(-3.0 * inside_share())).astype(np.float32)
+    with pytest.raises(DataError, match="no grey step between breast and air"):
+        analyse(slope, PIXEL_MM, "CC")
+
+
+def test_breast_that_fills_the_image_is_refused():
+    image = np.repeat(np.linspace(900.0, 600.0, 400)[None, :], 640, axis=0).astype(np.float32)
+    image[:, -12:] = 40.0
+    with pytest.raises(DataError, match="no part of its outline is skin|cropped too tightly"):
+        analyse(image, PIXEL_MM, "CC")
 
 
 def test_outline_runs_evenly_from_low_to_high_rows_and_fades_at_the_chest_wall():

@@ -2,12 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 from scipy import ndimage
 from skimage import measure
 
 from mammoreg.arrays import Floats32
 from mammoreg.errors import DataError
 from mammoreg.imaging.mammogram_air import Air
+from mammoreg.imaging.mammogram_polyline import across, grey_values, outward_normals, resampled
 
 # All chosen, from the blur and the pixels of a mammogram.
 _STEP_MM = 1.0  # of the outline's points
@@ -15,23 +17,33 @@ _SAMPLING_MM = 0.25  # of the contour before it is smoothed
 _WINDOW_MM = 5.0  # over which a cubic smooths it
 _MARGIN_MM = 1.0  # about the mask's border, within which the edge is sought
 _INSIDE_MM = 0.75  # how far in and out half of the brightness is sought
+_FOOT_SHARE = 0.035  # of the range, at which an edge is met before half of its brightness is sought
 _REFINED_MM = 0.05  # in steps of
 FADE_MM = 10.0  # over which trust fades before chest wall, border and muscle
 
 
 def outline_polyline(
-    smooth: Floats32, mask: NDArray[np.bool_], level: float, air: Air, pixel_mm: float
-) -> NDArray[np.float64]:
+    smooth: Floats32, mask: NDArray[np.bool_], level: float, reach: float, air: Air, pixel_mm: float
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Smooth polyline (M, 2) of (column, row) between skin and air, 1 mm apart, from its low-row to its high-row end.
+
+    It comes with the mask of the breast, cut where the skin's brightness begins to rise.
+
+    Args:
+        smooth: canonical image with its noise damped.
+        mask: of the breast, at the level at which it ends.
+        reach: range of grey values from air to dense tissue.
 
     Raises:
         DataError: If the breast shows no edge against air.
     """
-    contour = _longest_contour(_only_breast(smooth, mask, air, pixel_mm), level)
+    contour = _longest_contour(_only_breast(smooth, mask, level, air, pixel_mm), level)
     contour = _open_at_chest_wall(contour, _MARGIN_MM / pixel_mm)
-    contour = _at_half_height(_resampled(contour, _SAMPLING_MM / pixel_mm), smooth, mask, air, pixel_mm)
-    contour = _smooth_polyline(contour, pixel_mm)
-    return contour if contour[0, 1] <= contour[-1, 1] else contour[::-1].copy()
+    contour = contour if contour[0, 1] <= contour[-1, 1] else contour[::-1].copy()
+    contour = resampled(contour, _SAMPLING_MM / pixel_mm)
+    foot = _at_half_height(contour, smooth, air, pixel_mm, _FOOT_SHARE * reach)
+    outline = _smooth_polyline(_at_half_height(foot, smooth, air, pixel_mm), pixel_mm)
+    return outline, _inside(foot, mask)
 
 
 def outline_weight(
@@ -57,10 +69,20 @@ def outline_weight(
     return np.asarray(np.clip(distance / FADE_MM, 0.0, 1.0), dtype=float)
 
 
-def _only_breast(smooth: Floats32, mask: NDArray[np.bool_], air: Air, pixel_mm: float) -> Floats32:
-    near = ndimage.distance_transform_edt(~mask) * pixel_mm <= _MARGIN_MM
-    deep = ndimage.distance_transform_edt(mask) * pixel_mm > _MARGIN_MM
-    image = np.where(near, smooth, np.float32(air.level))
+def _inside(outline: NDArray[np.float64], mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    rows, columns = mask.shape
+    picture = Image.new("1", (columns, rows))
+    corners = [(-1.0, outline[0, 1]), *map(tuple, outline), (-1.0, outline[-1, 1])]
+    ImageDraw.Draw(picture).polygon(corners, fill=1)
+    return np.asarray(picture, dtype=bool) & mask
+
+
+def _only_breast(smooth: Floats32, mask: NDArray[np.bool_], level: float, air: Air, pixel_mm: float) -> Floats32:
+    width = 2 * max(1, round(_MARGIN_MM / pixel_mm)) + 1
+    near = ndimage.maximum_filter(mask, width)
+    deep = ndimage.minimum_filter(mask, width)
+    # What is bright beside the breast is a line or a letter that was left out.
+    image = np.where(near & (mask | (smooth < level)), smooth, np.float32(air.level))
     return np.asarray(np.where(deep, smooth.max(), image), dtype=np.float32)
 
 
@@ -80,28 +102,21 @@ def _open_at_chest_wall(contour: NDArray[np.float64], margin: float) -> NDArray[
 
 
 def _at_half_height(
-    contour: NDArray[np.float64], smooth: Floats32, mask: NDArray[np.bool_], air: Air, pixel_mm: float
+    contour: NDArray[np.float64], smooth: Floats32, air: Air, pixel_mm: float, most: float = np.inf
 ) -> NDArray[np.float64]:
-    """Move each point along its normal to half of the brightness that is reached just inside.
+    """Move each point along its normal to half of the brightness that is reached just inside, or to `most` if less.
 
-    The contour's level lies near the air's, which blur carries outwards by its own width.
+    Blur carries a level near the air's outwards by its own width. Air that glows counts as bright as it is just
+    outside.
     """
-    tangent = np.gradient(_smoothed(contour, min(21, len(contour) // 2 * 2 - 1), 1), axis=0)
-    outward = np.stack([tangent[:, 1], -tangent[:, 0]], axis=1)
-    outward /= np.maximum(np.linalg.norm(outward, axis=1), 1e-9)[:, None]
+    even = _smoothed(contour, min(21, len(contour) // 2 * 2 - 1), 1)
     steps = np.arange(-_INSIDE_MM, _INSIDE_MM, _REFINED_MM)
-    places = contour[:, None, :] + (steps / pixel_mm)[None, :, None] * outward[:, None, :]
-    if _sample(mask.astype(np.float32), places[:, 0]).mean() < _sample(mask.astype(np.float32), places[:, -1]).mean():
-        places = places[:, ::-1]
-    above = _sample(smooth, places) - air.level
-    low = above < 0.5 * above[:, :1]
+    places = across(contour, outward_normals(even), steps / pixel_mm)
+    grey = grey_values(smooth, places)
+    above = grey - np.maximum(grey[:, -1:], air.level)
+    low = above < np.minimum(0.5 * above[:, :1], most)
     first = np.where(low.any(axis=1), np.argmax(low, axis=1), len(steps) // 2)
     return np.asarray(places[np.arange(len(contour)), first], dtype=float)
-
-
-def _sample(image: Floats32, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    values = ndimage.map_coordinates(image, [places[..., 1], places[..., 0]], order=1, mode="nearest")
-    return np.asarray(values, dtype=float)
 
 
 def _smooth_polyline(dense: NDArray[np.float64], pixel_mm: float) -> NDArray[np.float64]:
@@ -109,13 +124,7 @@ def _smooth_polyline(dense: NDArray[np.float64], pixel_mm: float) -> NDArray[np.
     if len(dense) <= window:
         raise DataError("the breast's edge against air in the mammogram is shorter than 5 mm; check the image")
     # A local cubic keeps the curvature that a Gaussian would flatten.
-    return _resampled(_smoothed(dense, window, 3), _STEP_MM / pixel_mm)
-
-
-def _resampled(polyline: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(polyline, axis=0), axis=1))])
-    at = np.linspace(0.0, length[-1], max(2, round(length[-1] / step) + 1))
-    return np.stack([np.interp(at, length, polyline[:, axis]) for axis in range(2)], axis=1)
+    return resampled(_smoothed(dense, window, 3), _STEP_MM / pixel_mm)
 
 
 def _smoothed(polyline: NDArray[np.float64], window: int, degree: int) -> NDArray[np.float64]:

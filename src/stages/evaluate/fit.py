@@ -68,7 +68,7 @@ def fit_rows(
         row: Row = {"view": view, "method": method, **_placed(way.geometry, pose.laterality)}
         row |= {"force_n": None if solution is None else solution.force_n} | _fit_columns(outline, block, way)
         row["ncc"] = None if projected is None else ProjectRecord(projected).correlation(method)
-        row["outline_step"] = None
+        row["outline_step"] = pose.outline_step
         row["penetration_mm"] = None if solution is None else solution.penetration_mm
         row["folded_corners"] = None if solution is None else solution.folded_corners
         row["estimated"] = "; ".join(pose.estimated)

@@ -203,6 +203,12 @@ class PoseRecord(Record):
         return None if force is None else float(force)
 
     @property
+    def outline_step(self) -> float | None:
+        """Grey step across the outline, a share of the breast's range of grey values; None without an image."""
+        step = self._given("outline_step")
+        return None if step is None else float(step)
+
+    @property
     def flags(self) -> list[str]:
         """Doubts about the view."""
         return list(self.artefact.value("flags"))

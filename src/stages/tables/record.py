@@ -52,7 +52,7 @@ VIEWS = Table(
         "outline_p95_mm": 2,
         "outline_dice": 3,
         "ncc": 3,
-        "outline_step": 1,
+        "outline_step": 3,
         "penetration_mm": 2,
         "folded_corners": 0,
     },
