@@ -49,7 +49,7 @@ def header(stage: str, laterality: Laterality, view: str = "") -> dict[str, str]
     return {"stage": stage, "case": "case1", "view": view, "laterality": laterality, "artefact_id": f"{stage}{view}"}
 
 
-def write_segment(path: Path, laterality: Laterality, compressed: bool = False) -> Path:
+def write_segment(path: Path, laterality: Laterality, compressed: bool = False, warnings: tuple[str, ...] = ()) -> Path:
     spacing, n = np.full(3, 2.0), (56, 44, 56)
     origin = np.array([-55.0, -75.0, -55.0])
     grid = np.stack(
@@ -65,7 +65,7 @@ def write_segment(path: Path, laterality: Laterality, compressed: bool = False) 
     wall = np.stack([*np.meshgrid(side, side, indexing="ij"), np.zeros((31, 31))], axis=-1).reshape(-1, 3)[:, [0, 2, 1]]
     if compressed:
         volumes["compressed_mask"] = _compressed_mask()
-    fields = segment_fields(volumes, wall, np.array([0.0, -DEPTH, 0.0]), laterality, {})
+    fields = segment_fields(volumes, wall, np.array([0.0, -DEPTH, 0.0]), laterality, {"warnings": list(warnings)})
     write_artefact(path, header("segment", laterality), fields)
     return path
 

@@ -106,6 +106,14 @@ def test_what_speaks_against_a_view(tmp_path: Path) -> None:
     assert "outline misfit" in rows_of(found, "view_rows", "rigid")[0]["trust"]
 
 
+def test_doubts_of_the_segmentation_count_for_every_view_and_method(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path)
+    synthetic.write_segment(inputs["segment"][0], "R", warnings=("share of gland is 0.9",))
+    rows = evaluated(tmp_path, inputs).value("view_rows")
+    assert {row["view"] for row in rows} == {"CC", "MLO"}
+    assert all(row["trust"].endswith("share of gland is 0.9") for row in rows)
+
+
 def test_doubts_of_the_pose_stand_before_every_method_s_own(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path)
     doubts = {"CC": ["angle not determined by the image", "polarity assumed"], "MLO": []}

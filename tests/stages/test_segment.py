@@ -13,6 +13,7 @@ from pydicom import dcmread
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
+from mammoreg.imaging.anatomy import RANGES
 from stages.cohort.readers.mr import read_nifti
 from stages.cohort.series import series_token
 from stages.digital.dicom import mr_dicom
@@ -76,6 +77,22 @@ def test_nipple_and_volume_are_those_of_the_phantom(tmp_path: Path) -> None:
     assert fields.values["breast_volume_ml"] == pytest.approx(half_ellipsoid_ml, rel=0.2)
 
 
+def test_a_volume_that_ends_within_the_breast_is_doubted(tmp_path: Path) -> None:
+    whole = torso()
+    part = Volume(
+        np.ascontiguousarray(whole.data[:, :, 30:64]), whole.to_world(np.array([0, 0, 30])), whole.spacing, whole.frame
+    )
+    rows = {
+        name: {row["check"]: row for row in segment({"mr": write(volume, tmp_path / f"{name}.nii")}).values["checks"]}
+        for name, volume in (("whole", whole), ("part", part))
+    }
+    assert rows["whole"].keys() == RANGES.keys()
+    assert not any(row["doubt"] for row in rows["whole"].values())
+    cut = rows["part"]["cut_by_volume"]
+    assert cut["value"] > cut["high"]
+    assert "end of the volume" in cut["doubt"]
+
+
 def test_labels_on_another_grid_are_refused(tmp_path: Path) -> None:
     patient = torso()
     labels = Volume((patient.data > 70.0).astype(np.uint8), patient.origin + 3.0, patient.spacing)
@@ -125,6 +142,7 @@ def test_real_breasts(mr: str, side: Literal["L", "R"], suppressed: bool, nipple
     fields = segment({"mr": DATA / mr}, side)
     breast = fields.volumes["breast_mask"].volume
     assert fields.values["fat_suppressed"] is suppressed
+    assert fields.values["warnings"] == []
     assert np.linalg.norm(fields.arrays["nipple"].data - nipple) < 8.0
     back = fields.arrays["chest_wall_surface"].data
     x, y, z = breast.centres(breast.data > 0).T
@@ -156,7 +174,7 @@ def test_series_of_a_folder_stand_in_the_artefact_and_on_the_page_without_identi
             Subject("a", "R", row=given),
         )
         assert fields.status == "ok", fields.message
-    (section,) = case_page("a", "R", [Artefact(tmp_path / "folder.h5")]).sections
+    section, _ = case_page("a", "R", [Artefact(tmp_path / "folder.h5")]).sections
     assert section.rows[0][0].startswith("series 1, ")
     assert section.rows[0][1] == "taken"
     assert (section.rows[1][0][:8], section.rows[1][1]) == ("series 7", "subtraction")

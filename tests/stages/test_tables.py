@@ -18,7 +18,7 @@ from stages.tables.statistics import PRINTED
 
 FORMS = ("csv", "md", "html")
 NAMES = (
-    *("predictions_mammogram", "predictions_mr", "predictions_compressed", "views"),
+    *("predictions_mammogram", "predictions_mr", "predictions_compressed", "views", "segmentation"),
     *("table_5_mammogram", "table_6_mr", "elongation", "landmarks"),
 )
 
@@ -65,7 +65,9 @@ def write_cohort(folder: Path) -> dict[str, list[Path]]:
     unseen = seen | {"column": None, "row": None, "seen": False, "message": "outside the imaged part"}
     predicted = {"mammogram_rows": [seen | {"message": ""}, unseen | {"view": "MLO"}], "mr_rows": []}
     failure = Failure("mesh", "", "failed", "turned inside out")
+    check = {"check": "gland_share", "value": 0.70009, "low": 0.02, "high": 0.6, "unit": "1", "doubt": "too much"}
     return {
+        "segment": [write(folder, "segment", "good", {"checks": [check]})],
         "mesh": [write(folder, "mesh", "good", {}), write(folder, "mesh", "bad", {}, failure)],
         "localize": [write(folder, "localize", "good", predicted), write(folder, "localize", "bad", {}, failure)],
         "evaluate": [write(folder, "evaluate", "good", good), write(folder, "evaluate", "bad", bad, failure)],
@@ -101,6 +103,7 @@ chest_wall_depth_mm,message
 predictions_compressed case,method,name,x,y,z,message
 views case,view,method,angle_deg,edge_p_mm,middle_mm,height_mm,thickness_mm,force_n,outline_mean_mm,\
 outline_p95_mm,outline_dice,ncc,outline_step,penetration_mm,folded_corners,estimated,trust
+segmentation case,check,value,low,high,unit,doubt
 table_5_mammogram case,view,method,name,distance_mm,overlap_percent,dice,size_ratio
 table_6_mr case,views,method,name,distance_mm,overlap_percent,dice,size_ratio,distance_to_curve_mm
 elongation case,view,method,direction,elongation_mm,true_mm
@@ -118,6 +121,11 @@ def test_predictions_have_fixed_decimals_and_no_number_where_unseen(folder: Path
     lines = (folder / "predictions_mammogram.csv").read_text().splitlines()
     assert lines[1] == "good,CC,updated,lesion,10.13,7.00,,true,"
     assert lines[2] == "good,MLO,updated,lesion,,,,false,outside the imaged part"
+
+
+def test_a_segmentation_stands_beside_what_is_usual(folder: Path) -> None:
+    lines = (folder / "segmentation.csv").read_text().splitlines()
+    assert lines[1:] == ["good,gland_share,0.700,0.020,0.600,1,too much"]
 
 
 def test_texts_with_commas_are_quoted_and_no_negative_zero(folder: Path) -> None:
@@ -168,7 +176,7 @@ def test_readable_tables_say_first_what_is_missing(folder: Path) -> None:
 def test_netcdf_is_selected_by_approach(folder: Path) -> None:
     """`method` is a keyword of xarray's `sel`, which would ignore a dimension of that name without a word."""
     with xr.open_dataset(folder / "cohort.nc") as data:
-        assert set(data.sizes) == {"case", "view", "approach", "mark"}
+        assert set(data.sizes) == {"case", "view", "approach", "mark", "check"}
         lesion = data.lesion_mammogram_distance_mm.sel(mark="lesion")
         assert float(lesion.sel(approach="updated").mean()) == 3.0
         assert float(lesion.sel(approach="rigid").mean()) == 9.0

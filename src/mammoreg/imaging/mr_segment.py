@@ -12,6 +12,7 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_body import body_mask
 from mammoreg.imaging.mr_breast import back_points, breast_mask
+from mammoreg.imaging.mr_checks import Check, Seen, check_anatomy, check_field_of_view
 from mammoreg.imaging.mr_chest_wall import BackSettings, BackSurface, back_before_chest
 from mammoreg.imaging.mr_grid import Box, block_mean, nearest_labels, working_volume
 from mammoreg.imaging.mr_muscle import back_at_muscle
@@ -53,6 +54,7 @@ class Segmentation:
         back: points (N, 3) on that surface, mm.
         nipple: (3,), mm.
         fat_suppressed: whether fat is dark.
+        checks: measurements beside what is usual of a breast.
     """
 
     mr: Volume
@@ -61,6 +63,7 @@ class Segmentation:
     back: Points
     nipple: Points
     fat_suppressed: bool
+    checks: tuple[Check, ...] = ()
 
 
 def segment_volume(
@@ -94,7 +97,9 @@ def segment_volume(
         tissues = np.where(body, np.where(given[box] == 0, Label.SKIN, given[box]), 0).astype(np.uint8)
     reach = float(back.posterior(place.apex[0], place.apex[2]) - place.apex[1])
     nipple = find_nipple(corrected, body, depth, suppressed, place.apex, reach)
-    return Segmentation(corrected, tissues, breast, back_points(breast, grid, back), nipple, suppressed)
+    seen = Seen(volume, corrected, body, breast, tissues, depth, suppressed, place.heights_mm)
+    checks = check_anatomy(seen)
+    return Segmentation(corrected, tissues, breast, back_points(breast, grid, back), nipple, suppressed, checks)
 
 
 def segment_body(volume: Volume, spacing_mm: float) -> Volume:
@@ -111,6 +116,7 @@ def locate_body(volume: Volume, labels: Volume | None, spacing_mm: float) -> tup
     """Working grid around the breast of the wanted side, the body on it, and where the breast stands."""
     if not np.isfinite(volume.data).all():
         raise DataError("the MR volume holds values that are not finite (NaN or infinite): export it again")
+    check_field_of_view(volume)
     shape = None if labels is None else labels.with_data((labels.data > 0).astype(np.float32))
     coarse = block_mean(volume if shape is None else shape, COARSE_MM)
     coarse_body = body_mask(coarse) if shape is None else coarse.data > 0.5

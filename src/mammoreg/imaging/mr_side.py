@@ -20,10 +20,17 @@ WRONG_SIDE_MM = 30.0
 
 @dataclass(frozen=True)
 class BreastPlace:
-    """Where the wanted breast stands, breast frame, mm: its most anterior point and the midline next to it."""
+    """Where the wanted breast stands, breast frame, mm.
+
+    Attributes:
+        apex: its most anterior point.
+        midline_m: next to it.
+        heights_mm: of the wanted breast above the midline and, where both are in view, of the other one.
+    """
 
     apex: NDArray[np.float64]
     midline_m: float
+    heights_mm: tuple[float, ...] = ()
 
 
 def find_breast(body: Bools, grid: Volume) -> BreastPlace:
@@ -50,7 +57,20 @@ def find_breast(body: Bools, grid: Volume) -> BreastPlace:
     further = peaks[peaks > wanted]
     end = int(further[0]) if further.size else wanted
     valley = wanted + int(np.argmin(profile[wanted : end + 1])) if further.size else grid.shape[0]
-    return BreastPlace(_apex(relief, body, grid, wanted), float(grid.origin[0] + valley * grid.spacing[0]))
+    midline_m = float(grid.origin[0] + valley * grid.spacing[0])
+    return BreastPlace(_apex(relief, body, grid, wanted), midline_m, _heights(profile, m, wanted, further))
+
+
+def _heights(
+    profile: NDArray[np.float64], m: NDArray[np.float64], wanted: int, further: NDArray[np.intp]
+) -> tuple[float, ...]:
+    """Heights above the valley, mm, of the wanted breast and of the highest further one that is wholly in view."""
+    if not further.size:
+        return ()
+    other = int(further[np.argmax(profile[further])])
+    between = profile[wanted : other + 1].min()
+    whole = m[-1] - m[other] > m[other] - m[wanted + int(np.argmin(profile[wanted : other + 1]))]
+    return (float(profile[wanted] - between), float(profile[other] - between)) if whole else ()
 
 
 def _wanted_hill(profile: NDArray[np.float64], m: NDArray[np.float64], peaks: NDArray[np.intp]) -> int:

@@ -23,6 +23,7 @@ from stages.localize.record import Predictions
 from stages.mesh.record import MeshRecord
 from stages.methods import METHODS, method_views, of_view
 from stages.pose.record import PoseRecord
+from stages.segment.record import SegmentRecord
 from stages.views import IMAGED, view_order
 
 _PER_VIEW = ("pose", "compress", "shape", "solve", "project")
@@ -133,6 +134,9 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
         methods = method_views(pose, mesh.reference, results)
         fits += fit_rows(pose, mesh.block, methods, results, gaps, limits)
         elongations += elongation_rows(pose, mesh.block, methods)
+    doubts = SegmentRecord(inputs.artefact("segment")).doubts
+    for row in fits:
+        row["trust"] = "; ".join(filter(None, [row["trust"], *doubts]))
     for row in (row for row in fits if row["trust"]):
         print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
     return fits, elongations

@@ -14,7 +14,7 @@ from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
 from stages.localize.record import FILLING, STRAY, Predictions
 from stages.segment.record import SegmentRecord
-from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, TABLE_5, TABLE_6, VIEWS
+from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, SEGMENTATION, TABLE_5, TABLE_6, VIEWS
 from stages.views import SECOND_VOLUME, view_order
 
 SHOWN_METHOD = "updated"
@@ -146,6 +146,7 @@ def _sections(artefacts: Sequence[Artefact]) -> list[Section]:
         _section("Lesion in the MR volume against the truth", TABLE_6, artefacts),
         section_of("Landmarks against the truth", _landmark_rows(artefacts)),
         _turned(_section("Pose and fit of each view", VIEWS, artefacts)),
+        _section("Segmentation beside what is usual", SEGMENTATION, artefacts),
         section_of(
             "MR series in the folder",
             [row for a in artefacts if a.stage == "segment" and a.ok for row in SegmentRecord(a).mr_series],

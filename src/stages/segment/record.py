@@ -1,13 +1,16 @@
 """What stage `segment` leaves: the breast of the MR volume, and the mask of the second one."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from mammoreg.arrays import Points
 from mammoreg.geometry import Volume, breast_to_lps, lps_to_breast
 from mammoreg.geometry.frames import Laterality
+from mammoreg.imaging.anatomy import RANGES
+from mammoreg.imaging.mr_checks import Check
 from mammoreg.labels import Label
 from stages.engine.artefact import Array, Fields, Value, VolumeField
 from stages.engine.record import Record
@@ -43,6 +46,20 @@ def segment_fields(
     )
 
 
+def check_row(check: Check) -> dict[str, Any]:
+    """A row of `segmentation.csv`, without its column `case`; a limit that there is not is empty."""
+    usual = RANGES[check.name]
+    low, high = (limit if np.isfinite(limit) else None for limit in (usual.low, usual.high))
+    return {
+        "check": check.name,
+        "value": None if check.value is None else round(check.value, 4),
+        "low": low,
+        "high": high,
+        "unit": usual.unit,
+        "doubt": check.doubt,
+    }
+
+
 class SegmentRecord(Record):
     """The segmented breast; each property in the breast frame unless its name ends in `_lps`."""
 
@@ -69,6 +86,11 @@ class SegmentRecord(Record):
     @cached_property
     def _has_second_volume(self) -> bool:
         return "compressed_mask" in self.artefact.volume_names()
+
+    @property
+    def doubts(self) -> Sequence[str]:
+        """What speaks against the segmentation, in words."""
+        return list(self._given("warnings", []))
 
     @property
     def mr(self) -> Volume:

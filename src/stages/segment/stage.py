@@ -12,7 +12,7 @@ from stages.bias import n4_field
 from stages.cohort.readers.mr import mr_choice, read_labels, read_mr
 from stages.cohort.readers.mr_choice import MrChoice
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
-from stages.segment.record import segment_fields
+from stages.segment.record import check_row, segment_fields
 
 _SAME_PLACE_MM = 0.1
 _DEFAULTS = SegmentSettings()
@@ -95,6 +95,8 @@ def _values(found: Segmentation) -> dict[str, Value]:
         "fat_suppressed": found.fat_suppressed,
         "breast_volume_ml": round(float(found.breast.sum()) * found.mr.voxel_mm3 / 1000.0, 3),
         "gland_share": round(float((found.labels[found.breast] == Label.GLAND).mean()), 4),
+        "checks": [check_row(check) for check in found.checks],
+        "warnings": [check.doubt for check in found.checks if check.doubt],
     }
 
 

@@ -15,6 +15,7 @@ from stages.tables.record import (
     PREDICTIONS_COMPRESSED,
     PREDICTIONS_MAMMOGRAM,
     PREDICTIONS_MR,
+    SEGMENTATION,
     TABLE_5,
     TABLE_6,
     VIEWS,
@@ -25,6 +26,7 @@ _NAMED = (
     (PREDICTIONS_MR, "predicted_mr"),
     (PREDICTIONS_COMPRESSED, "predicted_compressed"),
     (VIEWS, "view"),
+    (SEGMENTATION, "segmentation"),
     (TABLE_5, "lesion_mammogram"),
     (TABLE_6, "lesion_mr"),
     (ELONGATION, "elongation"),
@@ -41,7 +43,7 @@ def cohort_netcdf(rows_of: Mapping[str, Sequence[Row]], outcomes: Mapping[str, t
     """The numbers of all tables as a netCDF-4 file; tables without rows leave none.
 
     Dimensions are `case`, `view` (CC, MLO, 3D, and CC+MLO where both are used together), `approach` (the tables'
-    `method`), `mark` (lesions and landmarks) and `direction`. Texts stand in the tables.
+    `method`), `mark` (lesions and landmarks), `direction` and `check`. Texts stand in the tables.
 
     Args:
         rows_of: rows by table name.

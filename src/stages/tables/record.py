@@ -58,6 +58,15 @@ VIEWS = Table(
     },
     ("estimated", "trust"),
 )
+SEGMENTATION = Table(
+    "segmentation",
+    "Each MR breast beside what is usual of one",
+    "segment",
+    "checks",
+    ("check",),
+    {"value": 3, "low": 3, "high": 3},
+    ("unit", "doubt"),
+)
 TABLE_5 = Table(
     "table_5_mammogram",
     "Table V: lesions in the mammograms",
@@ -96,6 +105,7 @@ TABLES = (
     PREDICTIONS_MR,
     PREDICTIONS_COMPRESSED,
     VIEWS,
+    SEGMENTATION,
     TABLE_5,
     TABLE_6,
     ELONGATION,
