@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mammogram_air import Air, find_air
+from mammoreg.imaging.mammogram_frame import without_frame
 from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation
 from mammoreg.imaging.views import View
 
@@ -22,14 +23,12 @@ class CanonicalMammogram:
         air: level and noise of the air in `pixels`.
         flips: between stored and canonical orientation.
         estimated: names of what the header did not give.
-        flags: what the image says against the header.
     """
 
     pixels: NDArray[np.float32]
     air: Air
     flips: Flips
     estimated: tuple[str, ...]
-    flags: tuple[str, ...]
 
 
 def canonicalise(
@@ -51,16 +50,17 @@ def canonicalise(
         linear: True where grey values are proportional to exposure (unprocessed data), which takes a logarithm.
 
     Raises:
-        DataError: If no breast is seen, or the image's chest-wall side contradicts its orientation.
+        DataError: If no breast is seen, or the image contradicts its orientation or its polarity.
     """
-    air = find_air(stored)
+    framed = without_frame(stored)
+    air = find_air(framed)
     flips = _flips(air, orientation, laterality, view)
-    pixels = _dense_bright(np.asarray(stored, dtype=np.float32), air, linear)
-    flags = ("polarity contradicts the air at the border",) if _contradicts(photometric, air, linear) else ()
+    _refuse_contradiction(photometric, air, linear)
+    pixels = _dense_bright(framed, air, linear)
     missing = {"orientation": orientation, "polarity": photometric}
     canonical = np.asarray(flips.apply(pixels), dtype=np.float32)
     estimated = tuple(name for name, value in missing.items() if value is None)
-    return CanonicalMammogram(canonical, find_air(canonical), flips, estimated, flags)
+    return CanonicalMammogram(canonical, find_air(canonical), flips, estimated)
 
 
 def _flips(air: Air, orientation: str | None, laterality: Laterality, view: View) -> Flips:
@@ -75,10 +75,15 @@ def _flips(air: Air, orientation: str | None, laterality: Laterality, view: View
     return flips
 
 
-def _contradicts(photometric: str | None, air: Air, linear: bool) -> bool:
-    if photometric is None or linear:
-        return False
-    return air.bright != (photometric.strip().upper() == "MONOCHROME1")
+def _refuse_contradiction(photometric: str | None, air: Air, linear: bool) -> None:
+    if photometric is None or linear or air.bright == (photometric.strip().upper() == "MONOCHROME1"):
+        return
+    found = "brighter" if air.bright else "darker"
+    raise DataError(
+        f"PhotometricInterpretation is {photometric.strip()}, but the image's border is {found} than its middle: the "
+        "polarity is wrong, or a frame, a label or a shutter covers the air; export the image again without it, or "
+        "correct PhotometricInterpretation"
+    )
 
 
 def _dense_bright(pixels: NDArray[np.float32], air: Air, linear: bool) -> NDArray[np.float32]:

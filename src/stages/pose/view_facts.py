@@ -78,7 +78,7 @@ def facts_of_mammogram(path: Path, subject: Subject) -> ViewFacts:
         seen=outlined.view,
         image=ImageOutline(found.outline, found.outline_weight),
         estimated=tuple(dict.fromkeys((*facts.estimated, *image.estimated))),
-        flags=(*facts.flags, *image.flags, *_outline_doubts(found)),
+        flags=(*facts.flags, *_outline_doubts(found)),
         mammogram=image.pixels,
         tissue=_tissue(found),
         storage=ImageStorage(rows, columns, bool(image.flips.rows), bool(image.flips.columns)),
