@@ -119,6 +119,17 @@ def test_angle_and_place_are_found(true_deg: float) -> None:
     assert found.alignment.rms_mm < 0.5
 
 
+@pytest.mark.parametrize("factor", [0.8, 0.85, 1.0, 1.15])
+def test_a_wrong_pixel_spacing_shows_in_the_size(factor: float) -> None:
+    """An outline `factor` times its true size, though edge and middle may move to hide it."""
+    mesh, (outline, _) = breast(LONG), taken(LONG, 0.0)
+    shown = replace(outline, radius=factor * outline.radius, centre_along_mm=factor * outline.centre_along_mm)
+    facets = skin_facets(mesh.skin_quads(), len(mesh.points), 2)
+    found = estimate_pose(VIEW, shown, Press(mesh.points), facets, 0.0, 16.0, 5.0)
+    assert found is not None
+    assert found.size == pytest.approx(1.0 / factor, rel=0.02)
+
+
 def test_dense_tissue_tells_what_the_outline_of_a_round_breast_cannot() -> None:
     blind, seeing = search(ROUND, 6.0, dense=False), search(ROUND, 6.0)
     assert blind is not None

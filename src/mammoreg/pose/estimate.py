@@ -18,6 +18,7 @@ from mammoreg.meshing.skin import SkinFacets
 from mammoreg.pose.alignment import Alignment, align, measure
 from mammoreg.pose.density import DensityImage, density_correlation, projected_structure
 from mammoreg.pose.outline import RadialOutline
+from mammoreg.pose.size import relative_size
 
 LOGGER = logging.getLogger(__name__)
 
@@ -64,6 +65,7 @@ class Candidate:
         skin: the same silhouette compared where skin makes it, not the rim at which the model ends.
         ncc: correlation of dense tissue.
         misfit: what is minimised.
+        surface: skin nodes (N, 3) in the plate frame, mm.
     """
 
     angle_deg: float
@@ -71,6 +73,7 @@ class Candidate:
     skin: Alignment
     ncc: float
     misfit: float
+    surface: Points
 
     @property
     def rim_share(self) -> float:
@@ -89,6 +92,7 @@ class PoseEstimate:
         determined: whether the image, not the header, decided the angle.
         at_bound: whether the angle ended at the bound of the search.
         angle_sd_deg: its standard deviation by the local curvature of the misfit.
+        size: how many times as large as the outline the silhouette is; a check, which moves nothing.
         candidates: the angles tried.
     """
 
@@ -97,6 +101,7 @@ class PoseEstimate:
     determined: bool
     at_bound: bool
     angle_sd_deg: float
+    size: float
     candidates: tuple[Candidate, ...]
 
 
@@ -144,7 +149,7 @@ def estimate_pose(
         tried_at = "angle %.2f degrees: outline %.2f mm, dense tissue %.3f, misfit %.3f"
         LOGGER.info(tried_at, at.angle_deg, state.rms_mm, ncc, misfit)
         on_skin = measure(skin, facets.quads, state.view, outline, facets.rim)
-        return Candidate(at.angle_deg, state, on_skin, ncc, misfit)
+        return Candidate(at.angle_deg, state, on_skin, ncc, misfit, skin)
 
     first = judge(0.0, view)
     # The plates' edge moves with the first alignment, and the compression with the edge.
@@ -158,7 +163,8 @@ def estimate_pose(
     final = judge(best - view.angle_deg, nearest.alignment.view) or nearest
     determined = 1.0 - (sd / prior_sd_deg) ** 2 >= DETERMINED_SHARE
     at_bound = abs(best - view.angle_deg) > bound_deg - AT_BOUND_DEG and step_deg > 0.0
-    return PoseEstimate(final.alignment.view, final.alignment, determined, at_bound, sd, tuple(ordered))
+    size = relative_size(final.surface, facets.quads, final.alignment.view, outline)
+    return PoseEstimate(final.alignment.view, final.alignment, determined, at_bound, sd, size, tuple(ordered))
 
 
 def _bracketed(judge: Callable[[float], Candidate | None], step_deg: float, bound_deg: float) -> dict[float, Candidate]:

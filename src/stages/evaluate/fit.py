@@ -1,6 +1,6 @@
 """Pose and fit of each view and method: `views.csv`. It needs no truth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from mammoreg.geometry import ViewGeometry
@@ -50,17 +50,19 @@ def fit_rows(
     results: list[Artefact],
     beam_gaps: Mapping[str, float],
     limits: Limits,
+    of_case: Sequence[str] = (),
 ) -> list[Row]:
     """One row per method of a view.
 
     Args:
         results: artefacts of `compress`, `solve` and `project`.
         beam_gaps: largest gap of the beams to a lesion, by method.
+        of_case: what speaks against all views of the case.
     """
     outline, view = pose.outline(FINE_RAYS) if pose.has_outline else None, pose.view
     projected, pressed = (of_view(results, stage, view) for stage in ("project", "compress"))
     compress = None if pressed is None else CompressRecord(pressed)
-    remarks = [*pose.flags, *_other_compression(pose, compress, limits.compression)]
+    remarks = [*pose.flags, *of_case, *_other_compression(pose, compress, limits.compression)]
     rows = []
     for method, way in methods.items():
         solved = of_view(results, MESH_METHODS.get(method), view)

@@ -19,6 +19,7 @@ from stages.evaluate.places import (
     lesion_rows_in_mr,
 )
 from stages.evaluate.record import EvaluateFields, Row
+from stages.evaluate.size_doubts import size_doubts
 from stages.localize.record import Predictions
 from stages.mesh.record import MeshRecord
 from stages.methods import METHODS, method_views, of_view
@@ -129,10 +130,11 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
     mesh = MeshRecord(inputs.artefact("mesh"))
     fits: list[Row] = []
     elongations: list[Row] = []
-    poses = (PoseRecord(artefact) for artefact in inputs.artefacts("pose") if artefact.ok)
+    poses = [PoseRecord(artefact) for artefact in inputs.artefacts("pose") if artefact.ok]
+    of_case = size_doubts([pose.relative_size for pose in poses])
     for pose in sorted(poses, key=lambda pose: view_order(pose.view)):
         methods = method_views(pose, mesh.reference, results)
-        fits += fit_rows(pose, mesh.block, methods, results, gaps, limits)
+        fits += fit_rows(pose, mesh.block, methods, results, gaps, limits, of_case)
         elongations += elongation_rows(pose, mesh.block, methods)
     doubts = SegmentRecord(inputs.artefact("segment")).doubts
     for row in fits:

@@ -197,6 +197,12 @@ class PoseRecord(Record):
         return np.zeros(3) if drawn is None else np.array(drawn, dtype=float)
 
     @property
+    def relative_size(self) -> float | None:
+        """How many times as large as the outline the compressed breast's silhouette is; None where nothing tells."""
+        size = self._given("relative_size")
+        return None if size is None else float(size)
+
+    @property
     def force_n(self) -> float | None:
         """Plate force that header or table gives."""
         force = self._given("header_force_n")

@@ -1,5 +1,7 @@
 """Stage `pose`: where the breast lay between the plates: projection angle, imaged portion and plates (section III)."""
 
+from dataclasses import replace
+
 import numpy as np
 from pydantic import Field
 
@@ -17,6 +19,7 @@ from stages.mechanics import CoarseMechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.affine import affine_maps, rigid_geometry
 from stages.pose.record import PoseFields
+from stages.pose.size import check_imaged_volume, check_size
 from stages.pose.view_facts import ViewFacts, facts_of_mammogram, facts_of_second_volume
 from stages.pose.without_image import without_image
 from stages.segment.record import SegmentRecord
@@ -65,11 +68,13 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         facts = facts_of_second_volume(second)
     else:
         return without_image(mesh, subject)
+    shown, odd = check_imaged_volume(facts, segment)
     mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
     dense = settings.use_density and not facts.seen.placed
     tissue = dense_tissue(segment.labels, segment.breast_mask, mesh) if dense else None
     search = PoseSearch(settings.angle_step_deg, settings.angle_bound_deg, settings.angle_sd_deg)
     found = find_pose(facts.seen, mesh, settings.mechanics.numerics(), mu_kpa, tissue, search)
+    facts = replace(facts, flags=(*facts.flags, *odd), values={**facts.values, **shown})
     return _fields(facts, mesh, segment.nipple, found)
 
 
@@ -89,7 +94,8 @@ def _doubts(facts: ViewFacts, found: FoundPose) -> tuple[str, ...]:
         (ANGLE_AT_BOUND, found.estimate.at_bound),
         (ANGLE_FROM_HEADER, not found.estimate.determined),
     )
-    return tuple(text for text, holds in doubts if holds)
+    odd = check_size(found.estimate.size, found.estimate.view)
+    return (*odd, *(text for text, holds in doubts if holds))
 
 
 def _fields(facts: ViewFacts, mesh: BlockMesh, nipple: Points, found: FoundPose) -> Fields:
@@ -128,6 +134,7 @@ def _drawn_mm(seen: OutlinedView, view: ViewGeometry) -> tuple[float, ...] | Non
 
 def _search_values(found: PoseEstimate) -> dict[str, Value]:
     return {
+        "relative_size": round(found.size, 4),
         "angle_sd_deg": found.angle_sd_deg if np.isfinite(found.angle_sd_deg) else None,
         "coarse_rms_mm": found.alignment.rms_mm,
         "tried": [
