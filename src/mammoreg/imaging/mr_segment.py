@@ -15,6 +15,7 @@ from mammoreg.imaging.mr_breast import back_points, breast_mask
 from mammoreg.imaging.mr_checks import Check, Seen, check_anatomy, check_field_of_view
 from mammoreg.imaging.mr_chest_wall import BackSettings, BackSurface, back_before_chest
 from mammoreg.imaging.mr_grid import Box, block_mean, nearest_labels, working_volume
+from mammoreg.imaging.mr_laterality import check_side
 from mammoreg.imaging.mr_muscle import back_at_muscle
 from mammoreg.imaging.mr_nipple import find_nipple
 from mammoreg.imaging.mr_side import BreastPlace, find_breast
@@ -55,6 +56,7 @@ class Segmentation:
         nipple: (3,), mm.
         fat_suppressed: whether fat is dark.
         checks: measurements beside what is usual of a breast.
+        side_doubt: what speaks against the side, in words; empty where nothing does.
     """
 
     mr: Volume
@@ -64,6 +66,7 @@ class Segmentation:
     nipple: Points
     fat_suppressed: bool
     checks: tuple[Check, ...] = ()
+    side_doubt: str = ""
 
 
 def segment_volume(
@@ -78,9 +81,10 @@ def segment_volume(
         bias_field: how the coil's inhomogeneity is estimated.
 
     Raises:
-        DataError: no usable breast in the volume; the message says what was missing.
+        DataError: no usable breast of that side in the volume; the message says what was missing.
     """
     grid, body, place = locate_body(volume, labels, settings.spacing_mm)
+    doubt = "" if place.side is None else check_side(place.side)
     given = None if labels is None else nearest_labels(labels, grid)
     back = _find_back(grid, body, given, place.apex, settings)
     breast = breast_mask(body, grid, back, place.apex)
@@ -99,7 +103,8 @@ def segment_volume(
     nipple = find_nipple(corrected, body, depth, suppressed, place.apex, reach)
     seen = Seen(volume, corrected, body, breast, tissues, depth, suppressed, place.heights_mm)
     checks = check_anatomy(seen)
-    return Segmentation(corrected, tissues, breast, back_points(breast, grid, back), nipple, suppressed, checks)
+    surface = back_points(breast, grid, back)
+    return Segmentation(corrected, tissues, breast, surface, nipple, suppressed, checks, doubt)
 
 
 def segment_body(volume: Volume, spacing_mm: float) -> Volume:

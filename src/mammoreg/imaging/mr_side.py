@@ -9,6 +9,7 @@ from scipy import ndimage
 from mammoreg.arrays import Bools
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
+from mammoreg.imaging.mr_laterality import SideEvidence, side_evidence
 
 HILL_MM = 15.0
 """A hill of the body lower than this is no breast."""
@@ -25,12 +26,14 @@ class BreastPlace:
     Attributes:
         apex: its most anterior point.
         midline_m: next to it.
+        side: what tells of its side, where it is alone in view.
         heights_mm: of the wanted breast above the midline and, where both are in view, of the other one.
     """
 
     apex: NDArray[np.float64]
     midline_m: float
     heights_mm: tuple[float, ...] = ()
+    side: SideEvidence | None = None
 
 
 def find_breast(body: Bools, grid: Volume) -> BreastPlace:
@@ -57,8 +60,10 @@ def find_breast(body: Bools, grid: Volume) -> BreastPlace:
     further = peaks[peaks > wanted]
     end = int(further[0]) if further.size else wanted
     valley = wanted + int(np.argmin(profile[wanted : end + 1])) if further.size else grid.shape[0]
-    midline_m = float(grid.origin[0] + valley * grid.spacing[0])
-    return BreastPlace(_apex(relief, body, grid, wanted), midline_m, _heights(profile, m, wanted, further))
+    midline_m = float(m[0] + valley * grid.spacing[0])
+    apex = _apex(relief, body, grid, wanted)
+    side = None if further.size else side_evidence(body, grid, apex)
+    return BreastPlace(apex, midline_m, _heights(profile, m, wanted, further), side)
 
 
 def _heights(

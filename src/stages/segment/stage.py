@@ -96,7 +96,7 @@ def _values(found: Segmentation) -> dict[str, Value]:
         "breast_volume_ml": round(float(found.breast.sum()) * found.mr.voxel_mm3 / 1000.0, 3),
         "gland_share": round(float((found.labels[found.breast] == Label.GLAND).mean()), 4),
         "checks": [check_row(check) for check in found.checks],
-        "warnings": [check.doubt for check in found.checks if check.doubt],
+        "warnings": [doubt for doubt in (found.side_doubt, *(check.doubt for check in found.checks)) if doubt],
     }
 
 
