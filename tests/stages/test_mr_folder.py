@@ -242,6 +242,42 @@ def test_multi_frame(tmp_path, whole_file):
     assert_is_the_field(read_mr(path))
 
 
+def test_multi_frame_with_a_stack_for_each_breast(tmp_path):
+    """Two stacks in one object, told by StackID: each side takes its own."""
+    slabs = [
+        series("t1", start=(x, -8.0, 5.0), axes=SAGITTAL, field=lambda p: linear_field(p) + 400.0) for x in (-60, 70)
+    ]
+    found = multi_frame([*slabs[0], *slabs[1]])
+    for number, group in enumerate(found.PerFrameFunctionalGroupsSequence):
+        group.FrameContentSequence[0].StackID = str(1 + number // 9)
+    write(tmp_path, [found])
+    right, left = (read_mr(tmp_path, side).origin[0] for side in ("R", "L"))
+    assert right < -60.0
+    assert left > 50.0
+    (why,) = reasons(tmp_path, "R").values()
+    assert "other breast" in why
+
+
+def test_a_series_for_a_biopsy_comes_last(tmp_path):
+    write(tmp_path / "a", series("t1 biopsy grid", SeriesNumber=2, step_mm=1.0, count=18))
+    write(tmp_path / "b", series("t1", SeriesNumber=3))
+    assert taken(tmp_path).startswith("series 3")
+    assert "biopsy" in reasons(tmp_path)["2"]
+    assert "between plates" in mr_choice(tmp_path, "R", "2").notes[0]
+
+
+def test_a_blank_slice_between_others_is_refused(tmp_path):
+    slices = series("t1")
+    slices[4].PixelData = bytes(len(slices[4].PixelData))
+    write(tmp_path, slices)
+    with pytest.raises(DataError, match="slice 5 along axis 3 is blank"):
+        read_mr(tmp_path)
+    ends = series("t1", study="padded")
+    for header in (ends[0], ends[-1]):
+        header.PixelData = bytes(len(header.PixelData))
+    assert read_mr(write(tmp_path / "padded", ends)).shape == (10, 12, 9)
+
+
 def test_multi_frame_files_of_one_frame_each(tmp_path):
     write(tmp_path, [multi_frame([header]) for header in series("t1")])
     assert_is_the_field(read_mr(tmp_path))

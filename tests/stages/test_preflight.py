@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from stages.cohort.cases import read_cohort
-from stages.cohort.preflight import check_cohort
+from stages.cohort.preflight import check_cohort, warnings_of
 from tests.shared_data import DATA, requires_shared
 from tests.stages.cohort_files import (
     AFFINE,
@@ -19,6 +19,7 @@ from tests.stages.cohort_files import (
     write_tsv,
     write_volume,
 )
+from tests.stages.mr_series import series, write
 
 
 @pytest.fixture
@@ -328,3 +329,19 @@ def test_picture_that_ends_early(folder):
     assert _faults(folder) == []
     _cut(folder / "cc.png", 0.6)
     assert any("cc.png: ends early or is damaged" in fault for fault in _faults(folder))
+
+
+@pytest.mark.parametrize(("birthday", "told"), [("19650101", True), ("19700101", False), ("", False)])
+def test_a_mammogram_of_another_woman(folder, birthday, told):
+    """Other number and birthday than the MR's are a fault; another number alone is remarked, and neither is quoted."""
+    write(folder / "MR", series("t1"))
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "MR"})
+    write_tsv(folder / "views.tsv", {"case": "c1", "view": "CC", "image": "cc.dcm"})
+    write_dicom(folder / "cc.dcm", PatientID="4711", PatientBirthDate=birthday)
+    faults, remarks = _faults(folder), warnings_of(read_cohort(folder / "cases.tsv", folder / "views.tsv"))
+    (said,) = [line for line in (faults if told else remarks) if "name different patients" in line]
+    assert len(faults) == told
+    assert not any(secret in said for secret in ("4711", "1965", "1970", "Doe"))
+    write_dicom(folder / "cc.dcm", PatientID="ID-Doe^Jane", PatientBirthDate=birthday)
+    assert _faults(folder) == []
+    assert not warnings_of(read_cohort(folder / "cases.tsv", folder / "views.tsv"))

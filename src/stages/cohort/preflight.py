@@ -10,6 +10,7 @@ import numpy as np
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.cases import CaseRow, Cohort, ViewRow
+from stages.cohort.identity import strangers
 from stages.cohort.mark_checks import (
     check_mr_lesion,
     check_mr_points,
@@ -44,7 +45,8 @@ def check_cohort(cohort: Cohort, made: Collection[Path] = ()) -> list[Fault]:
         where = f"{cohort.views_file.name if cohort.views_file else ''} ({view.case} {view.view})"
         laterality = cohort.cases[view.case].laterality
         faults += list(_Checked(where, view, made).view_faults(view, laterality))
-    return faults
+    remedy = "correct the table, or exclude the row"
+    return faults + [Fault(where, what, remedy) for where, what, certain in strangers(cohort, made) if certain]
 
 
 def warnings_of(cohort: Cohort) -> list[str]:
@@ -57,6 +59,11 @@ def warnings_of(cohort: Cohort) -> list[str]:
     return [
         *odd,
         *(f"{where}: {note}" for where, choice in _mr_choices(cohort) for note in choice.notes),
+        *(
+            f"{where}: {what}; if they are of one woman all is well"
+            for where, what, sure in strangers(cohort)
+            if not sure
+        ),
     ]
 
 

@@ -75,7 +75,7 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
     found = [f"{row['view']}: {row['trust']}" for row in rows]
     found += [*_unknown_depths(artefacts), *_stray_marks(artefacts)]
     for artefact in artefacts:
-        for name in ("warnings", "flags", "mr_series_notes"):
+        for name in ("warnings", "flags", "mr_series_notes", "mr_compressed_series_notes"):
             remarks = artefact.value(name) if artefact.has(name) else []
             found += [
                 f"{artefact.view or artefact.stage}: {r}" for r in remarks if not any(r in text for text in found)

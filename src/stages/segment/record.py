@@ -115,12 +115,14 @@ class SegmentRecord(Record):
 
     @property
     def mr_series(self) -> list[dict[str, str]]:
-        """The MR series of a folder of DICOM files, a row each, first the one taken; empty where none was chosen."""
-        if not self.artefact.has("mr_series"):
-            return []
-        return [{"series": str(self.artefact.value("mr_series")), "": "taken"}] + [
-            {"series": row["series"], "": row["left because"]} for row in self.artefact.value("mr_series_left")
-        ]
+        """The MR series of folders of DICOM files, a row each, first the one taken; empty where none was chosen."""
+        rows = []
+        for column in ("mr", "mr_compressed"):
+            if self.artefact.has(f"{column}_series"):
+                rows.append({"column": column, "series": str(self.artefact.value(f"{column}_series")), "": "taken"})
+                left = self.artefact.value(f"{column}_series_left")
+                rows += [{"column": column, "series": row["series"], "": row["left because"]} for row in left]
+        return rows
 
     @property
     def nipple_lps(self) -> Points:

@@ -69,10 +69,12 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         "labels": found.mr.with_data(found.labels),
         "breast_mask": found.mr.with_data(found.breast.astype(np.uint8)),
     }
+    values = _values(found) | _choice_values("mr", choice)
     if compressed_path is not None:
+        values |= _choice_values("mr_compressed", mr_choice(compressed_path, side))
         second = read_mr(compressed_path, side).to_breast(side)
         volumes["compressed_mask"] = segment_body(second, settings.spacing_mm)
-    return segment_fields(volumes, found.back, found.nipple, side, _values(found) | _choice_values(choice))
+    return segment_fields(volumes, found.back, found.nipple, side, values)
 
 
 def _back_settings(settings: Settings) -> BackSettings:
@@ -100,12 +102,16 @@ def _values(found: Segmentation) -> dict[str, Value]:
     }
 
 
-def _choice_values(choice: MrChoice | None) -> dict[str, Value]:
-    """Which series was taken of a folder of DICOM files, and why not the others."""
+def _choice_values(column: str, choice: MrChoice | None) -> dict[str, Value]:
+    """Which series was taken of a column's folder of DICOM files, and why not the others."""
     if choice is None:
         return {}
     left = [{"series": what, "left because": why} for what, why in choice.left]
-    return {"mr_series": choice.taken, "mr_series_left": left, "mr_series_notes": list(choice.notes)}
+    return {
+        f"{column}_series": choice.taken,
+        f"{column}_series_left": left,
+        f"{column}_series_notes": list(choice.notes),
+    }
 
 
 STAGE = Stage(

@@ -49,7 +49,10 @@ def read_dicom(path: Path, *, pixels: bool = False, tags: Sequence[str] | None =
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = dcmread(
-                path, stop_before_pixels=not pixels, force=bare, specific_tags=None if tags is None else [*tags]
+                path,
+                stop_before_pixels=not pixels,
+                force=bare,
+                specific_tags=None if tags is None else [*map(header_values.tag_of, tags)],
             )
     except OSError as error:
         raise DataError(f"{path}: cannot be opened ({error.strerror or error}); copy it again or remove it") from error

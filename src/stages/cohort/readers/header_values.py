@@ -3,12 +3,13 @@
 import re
 import struct
 from dataclasses import dataclass
+from functools import cache
 
 from pydicom.datadict import dictionary_VR
 from pydicom.dataelem import RawDataElement
 from pydicom.dataset import Dataset
 from pydicom.multival import MultiValue
-from pydicom.tag import Tag
+from pydicom.tag import BaseTag, Tag
 
 _BINARY = {"US": "H", "SS": "h", "UL": "I", "SL": "i", "FL": "f", "FD": "d"}
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
@@ -28,10 +29,16 @@ class Number:
     comma: bool = False
 
 
+@cache
+def tag_of(keyword: str) -> BaseTag:
+    """The tag of a keyword; looking it up takes longer than reading a value."""
+    return Tag(keyword)
+
+
 def texts(header: Dataset, keyword: str) -> tuple[str, ...]:
     """The values of an element as texts without blanks around them, empty ones at the end left out."""
     try:
-        element = header.get_item(Tag(keyword))
+        element = header.get_item(tag_of(keyword))
     except (KeyError, ValueError):
         return ()
     if element is None:

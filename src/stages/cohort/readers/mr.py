@@ -17,6 +17,8 @@ from stages.cohort.readers.mr_voxels import stack_voxels
 LABEL_ROUNDING = 1e-3
 """A header's scale factor may take labels off whole numbers by this much."""
 
+MOST_LOST_SLICES = 4
+
 
 def read_mr(path: Path, side: Laterality | None = None, series: str = "") -> Volume:
     """Read the intensities of an MR volume, LPS mm, float32; oblique ones are resampled, 0 outside.
@@ -33,7 +35,23 @@ def read_mr(path: Path, side: Laterality | None = None, series: str = "") -> Vol
     data, affine = _dicom_voxels(path, side, series) if is_mr_dicom(path) else _nifti_voxels(path)
     if not np.isfinite(data).all():
         raise DataError(f"{path}: holds values that are not finite (NaN or infinite); export the volume again")
+    _check_no_blank_slice(path, data)
     return volume_of_affine(data.astype(np.float32, copy=False), affine, order=1)
+
+
+def _check_no_blank_slice(path: Path, data: NDArray[Any]) -> None:
+    """Refuse a volume with slices lost in the making: of one value, between slices that are not.
+
+    Many in a row may be the empty space between two breasts that were cut out.
+    """
+    for axis in range(3):
+        others = tuple(n for n in range(3) if n != axis)
+        blank = data.max(axis=others) == data.min(axis=others)
+        shown = np.flatnonzero(~blank)
+        lost = [int(n) for n in np.flatnonzero(blank) if len(shown) and shown[0] < n < shown[-1]]
+        if 0 < len(lost) <= MOST_LOST_SLICES:
+            listed = ", ".join(str(n + 1) for n in lost)
+            raise DataError(f"{path}: slice {listed} along axis {axis + 1} is blank; export the volume again")
 
 
 def mr_choice(path: Path, side: Laterality | None = None, series: str = "") -> MrChoice | None:

@@ -13,6 +13,7 @@ from stages.cohort.series import series_token
 
 _COVERS = 0.6
 _APART = 0.8
+_AFTER_PLACE = 2
 _ONE_BREAST_MM = 260.0
 _REMEDY = "name one of them in the column mr_series, by its number or its SeriesInstanceUID"
 _PLANES = ("sagittal", "coronal", "axial")
@@ -112,6 +113,7 @@ def _class(stack: MrStack, usable: Sequence[MrStack]) -> tuple[int, ...]:
     """What matters more than fineness, the best 0 everywhere."""
     weight = 0 if mr_kind.weighting(stack) == "T1" else 1
     return (
+        int(mr_kind.for_biopsy(stack)),
         weight,
         _after(stack, usable),
         mr_kind.fat_and_water(stack),
@@ -140,11 +142,18 @@ def _covers_less(stack: MrStack, usable: Sequence[MrStack]) -> bool:
 
 def _behind(stack: MrStack, best: MrStack, usable: Sequence[MrStack]) -> str:
     """Why a stack that would do comes after the best."""
-    words = ("is not known to be T1", "", "shows fat alone or opposed phases", "is reformatted", "covers less")
+    words = (
+        "was taken for a biopsy",
+        "is not known to be T1",
+        "",
+        "shows fat alone or opposed phases",
+        "is reformatted",
+        "covers less",
+    )
     mine, its = _class(stack, usable), _class(best, usable)
     place = next((n for n, (a, b) in enumerate(zip(mine, its, strict=True)) if a > b), None)
-    if place == 1:
-        return "with contrast agent" if mine[1] == 2 else "taken after a series with contrast agent"
+    if place == _AFTER_PLACE:
+        return "with contrast agent" if mine[_AFTER_PLACE] == 2 else "taken after a series with contrast agent"
     if place is not None:
         return words[place]
     if round(stack.largest_spacing_mm, 1) > round(best.largest_spacing_mm, 1):
@@ -174,6 +183,8 @@ def _notes(best: MrStack, usable: Sequence[MrStack], *, by_name: bool) -> tuple[
         notes.append(f"mr_series names a {reason} by its header; no anatomy is to be expected in it")
     if mr_kind.weighting(best) == "T2":
         notes.append("the MR volume is T2-weighted by its header; the segmentation is made for T1")
+    if mr_kind.for_biopsy(best):
+        notes.append("the MR volume was taken for a biopsy by its header; the breast may lie between plates in it")
     if _after(best, usable):
         notes.append("the MR volume was taken with contrast agent by its header, and there is none before it")
     frames = {s.first.frame_of_reference for s in usable if _class(s, usable) == _class(best, usable)}

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -106,12 +107,12 @@ class MrFrame:
     order: Mapping[str, str | float]
     laterality: str
 
-    @property
+    @cached_property
     def normal(self) -> NDArray[np.float64]:
         """Direction (3,) across the picture, LPS."""
         return np.cross(self.axes[0], self.axes[1])
 
-    @property
+    @cached_property
     def along(self) -> float:
         """Place along the normal, mm."""
         return float(self.normal @ self.position)

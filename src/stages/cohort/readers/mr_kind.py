@@ -155,6 +155,11 @@ def fat_and_water(stack: MrStack) -> int:
     return 1 if values & {"FAT", "F"} and not values & {"SAT", "SUPPRESSED", "FS", "WATER", "W"} else 0
 
 
+def for_biopsy(stack: MrStack) -> bool:
+    """Whether it was taken to guide a needle, perhaps with the breast between plates."""
+    return bool(stack.first.words & {"biopsy", "bx", "biopsie", "biopsia", "needle", "grid"})
+
+
 def reformatted(stack: MrStack) -> bool:
     """Whether it was computed from slices in another direction, or otherwise made anew."""
     return bool({"MPR", "REFORMATTED", "RESAMPLED", "CSA MPR"} & set(stack.first.kind)) or "mpr" in stack.first.words

@@ -3,6 +3,7 @@
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -45,23 +46,23 @@ class MrStack:
     fault: str = ""
     copies: int = 0
 
-    @property
+    @cached_property
     def first(self) -> MrFrame:
         """The picture at one end, whose header stands for all."""
         return self.frames[0]
 
-    @property
+    @cached_property
     def shape(self) -> tuple[int, int, int]:
         """Voxels along a row, along a column, and across."""
         return self.first.columns, self.first.rows, len(self.frames)
 
-    @property
+    @cached_property
     def step(self) -> NDArray[np.float64]:
         """From one slice to the next (3,), LPS mm."""
         ends = self.frames[-1].position - self.first.position
         return np.asarray(ends / max(len(self.frames) - 1, 1))
 
-    @property
+    @cached_property
     def affine(self) -> NDArray[np.float64]:
         """From voxel indices to LPS, mm (4, 4)."""
         between_rows, between_columns = self.first.pixel_mm
@@ -71,22 +72,22 @@ class MrStack:
         affine[:3] = np.column_stack(columns)
         return affine
 
-    @property
+    @cached_property
     def middle(self) -> NDArray[np.float64]:
         """Centre (3,), LPS mm."""
         return self.affine[:3, :3] @ ((np.array(self.shape) - 1) / 2.0) + self.first.position
 
-    @property
+    @cached_property
     def half_extent(self) -> NDArray[np.float64]:
         """Half of what it spans along x, y, z (3,), mm."""
         return np.asarray(np.abs(self.affine[:3, :3]) @ ((np.array(self.shape) - 1) / 2.0))
 
-    @property
+    @cached_property
     def largest_spacing_mm(self) -> float:
         """The coarsest of the three spacings."""
         return float(np.linalg.norm(self.affine[:3, :3], axis=0).max())
 
-    @property
+    @cached_property
     def moment(self) -> tuple[str | float, ...]:
         """When it was taken, to be compared within a study; empty where no header says so."""
         times = [str(frame.order["time"]) for frame in self.frames if "time" in frame.order]

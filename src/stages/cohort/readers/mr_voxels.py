@@ -41,7 +41,8 @@ def stack_voxels(stack: MrStack) -> NDArray[np.float32]:
         for place, frame in frames:
             if frame.index >= len(stored) or stored[frame.index].shape != stack.shape[1::-1]:
                 raise DataError(f"{path}: its pixels are not as many as its header says; export the series again")
-            voxels[:, :, place] = stored[frame.index].T * np.float32(frame.slope) + np.float32(frame.intercept)
+            with np.errstate(over="ignore", invalid="ignore"):  # what is not finite then is refused
+                voxels[:, :, place] = stored[frame.index].T * np.float32(frame.slope) + np.float32(frame.intercept)
     return voxels
 
 
