@@ -1,4 +1,4 @@
-# make run | test | verify | check | bench: each sets up .venv by itself, from the hashed locks.
+# make run | test | test-mutants | verify | check | bench: each sets up .venv by itself, from the hashed locks.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 CORES ?= all
 BIN := .venv/bin
@@ -6,11 +6,12 @@ SHELL := /bin/bash
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help run test verify check bench lock generated
+.PHONY: help run test test-mutants verify check bench lock generated
 
 help:
 	@echo "make run    the embedded cohort on all cores, then its results and where things are (CORES=2 for fewer)"
 	@echo "make test   the test suite"
+	@echo "make test-mutants  hundreds of damaged, altered and mistaken inputs; minutes"
 	@echo "make verify the verification of the finite elements, with what takes minutes"
 	@echo "make check  formatting, lint, types, import boundaries, workflow lint"
 	@echo "make bench  time and memory of the solver, beside peers, and of a two-view case, stage by stage"
@@ -20,6 +21,9 @@ run: .venv/runtime
 
 test: .venv/development
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+
+test-mutants: .venv/development
+	$(BIN)/python -m pytest -s -m slow tests/mutants
 
 verify: .venv/development
 	$(BIN)/python -m pytest -n auto --dist loadfile -m "slow or not slow" tests/verification
