@@ -37,7 +37,10 @@ class Campaign:
     def run(self, mutants: Sequence[Mutant]) -> tuple[list[Judged], dict[str, Outcome]]:
         """Verdicts on the mutants, in their order, and the outcomes of the unmutated cases."""
         names = list(dict.fromkeys(mutant.base for mutant in mutants))
-        for number, ended in run_all(names, self._make_base, self.processes, 3 * TIMEOUT_S):
+        for name in names:
+            if not (self._base(name) / "case").exists():
+                self.makers[name](self._base(name) / "case")
+        for number, ended in run_all(names, self._run_base, self.processes, 3 * TIMEOUT_S):
             if ended != "done":
                 raise RuntimeError(f"the unmutated case {names[number]} ended as {ended}")
         bases = {name: Outcome.read(self._base(name) / "outcome.json") for name in names}
@@ -48,10 +51,9 @@ class Campaign:
     def _base(self, name: str) -> Path:
         return self.folder / "unmutated" / name
 
-    def _make_base(self, name: str) -> None:
-        base = self._base(name)
-        memory: Memory = {}
-        case = self.makers[name](base / "case")
+    def _run_base(self, name: str) -> None:
+        base, memory = self._base(name), Memory()
+        case = CaseFolder.read(base / "case")
         run_case(case.tables, base / "results", memory).write(base / "outcome.json")
         write_memory(base / "memory.json", memory)
 

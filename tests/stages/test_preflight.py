@@ -345,3 +345,14 @@ def test_a_mammogram_of_another_woman(folder, birthday, told):
     write_dicom(folder / "cc.dcm", PatientID="ID-Doe^Jane", PatientBirthDate=birthday)
     assert _faults(folder) == []
     assert not warnings_of(read_cohort(folder / "cases.tsv", folder / "views.tsv"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [(b"UL\x04\x00", b"UL\x03\x00"), (b"1.2.840.10008.1.2.1\0", b"8.2.840.10008.1.2.1\0")]
+)
+def test_mammogram_whose_first_bytes_are_damaged(folder, old, new):
+    path = folder / "cc.dcm"
+    content = path.read_bytes()
+    assert old in content
+    path.write_bytes(content.replace(old, new, 1))
+    _assert_only(folder, "cc.dcm: ")
