@@ -103,7 +103,7 @@ def nifti_of(case: CaseFolder, column: str = "mr") -> tuple[Path, Any, np.ndarra
     """A NIfTI file of the case: its path, the image and the voxels as stored."""
     path = case.path(column, suffix=".nii.gz")
     image = nibabel.load(path)
-    return path, image, np.array(image.dataobj)
+    return path, image, np.array(np.asanyarray(image.dataobj))
 
 
 def save_nifti(path: Path, data: np.ndarray, affine: np.ndarray, image_type: Any = nibabel.Nifti1Image) -> None:

@@ -58,6 +58,6 @@ def quick_share(found: Sequence[Mutant]) -> list[Mutant]:
         lambda m: m.mutation.kind in ("marks", "tables"),
         lambda m: m.mutation.kind == "damaged bytes" and "lesion" in m.mutation.name,
         lambda m: m.mutation.kind == "mammogram header" and "no number" in m.mutation.name,
-        lambda m: m.mutation.kind == "harmless" and (m.mutation.name.startswith("table") or "mask" in m.mutation.name),
+        lambda m: m.mutation.kind == "harmless" and m.mutation.name.startswith(("table", "mask of 255")),
     )
     return [m for m in found if any(test(m) for test in cheap) and zlib.crc32(m.name.encode()) % _ANY == 0]

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
@@ -58,7 +59,9 @@ def _ended(one: _Running) -> str:
 
 
 def _quietly(work: Callable[[Job], None], job: Job) -> None:
-    """Without what the stages print."""
+    """Without what the stages print, and with warnings that warn, as a user's run has them."""
+    warnings.resetwarnings()
+    warnings.simplefilter("ignore")
     silence = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silence, 1)
     os.dup2(silence, 2)
