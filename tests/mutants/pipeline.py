@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from stages.cohort.cases import Cohort, read_cohort
-from stages.cohort.preflight import check_cohort
+from stages.cohort.preflight import check_cohort, choices_of, warnings_of
 from stages.engine.artefact import Artefact, Fields
 from stages.engine.contract import Subject
 from stages.engine.errors import FaultsError, UserError
@@ -102,6 +102,7 @@ def _run(tables: tuple[Path, Path], results: Path, memory: Memory) -> Outcome:
         cohort = read_cohort(*tables)
         if faults := check_cohort(cohort):
             raise FaultsError(faults)
+        warnings_of(cohort), choices_of(cohort)
     except UserError as error:
         return Outcome("check", str(error))
     if not cohort.cases:
