@@ -16,8 +16,8 @@ from mammoreg.projection.cone_beam import project_volume
 from tests.unit.torso_phantom import CHEST_P, RIGHT, torso
 
 ELEMENTS, EDGE_P, PIXEL_MM, ROWS, COLUMNS = 6, CHEST_P - 6.0, 0.5, 460, 260
-ANGLES = {"CC": 3.0, "MLO": 49.0}
-GAPS = {"CC": 60.0, "MLO": 56.0}
+ANGLES = {"CC": 3.0, "MLO": 49.0, "ML": 87.0, "LM": -94.0, "LMO": -131.0, "FB": 183.0, "XCCL": 4.0}
+GAPS = {"CC": 60.0, "MLO": 56.0, "ML": 58.0, "LM": 57.0, "LMO": 56.0, "FB": 60.0, "XCCL": 60.0}
 MECHANICS = BreastMechanics(material="homogeneous", fibre_ratio=0.0, friction=0.2, back="slide_plane")
 LESIONS = np.array([[-78.0, 14.0, 12.0], [-58.0, 24.0, -22.0], [-86.0, 30.0, -4.0]])
 """Places (3, 3) in the breast, LPS of the right one."""

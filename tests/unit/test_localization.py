@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.geometry.frames import plate_rotation
+from mammoreg.imaging.views import PROJECTIONS
 from mammoreg.localization.anatomy import clock_position
 from mammoreg.localization.deformation import AffineDeformation, MeshDeformation, MethodView, ReferenceMesh
 from mammoreg.localization.grid import BreastGrid, BreastInView
@@ -180,6 +181,44 @@ def test_two_views_give_back_the_sphere(centre: list[float], diameter: float) ->
     covered = np.count_nonzero(radius <= 0.5 * diameter) * found.region.voxel_mm3
     assert covered == pytest.approx(ball, rel=0.12)
     assert len(cells) * found.region.voxel_mm3 < 2.2 * ball
+
+
+def of_views(*names: str) -> dict[str, MethodView]:
+    angles = {name: PROJECTIONS[name].angle_deg + 4.0 for name in names}
+    return {name: MethodView(turned(angle, 0.6), view(angle)) for name, angle in angles.items()}
+
+
+@pytest.mark.parametrize(
+    "names", [("CC", "ML"), ("CC", "LM"), ("MLO", "LM"), ("LMO", "FB"), ("XCCL", "MLO"), ("CC", "MLO", "ML", "LMO")]
+)
+def test_any_views_that_cross_give_back_the_sphere(names: tuple[str, ...]) -> None:
+    methods, centre = of_views(*names), np.array([15.0, -30.0, -12.0])
+    areas = {name: true_area(method, centre, 10.0) for name, method in methods.items()}
+    found = locate_in_breast({n: BreastInView(m, GRID) for n, m in methods.items()}, areas)
+    assert found.message == ""
+    np.testing.assert_allclose(found.point, centre, atol=0.5)
+
+
+@pytest.mark.parametrize("names", [("CC", "FB"), ("ML", "LM"), ("MLO", "LMO"), ("CC", "XCCM")])
+def test_beams_that_run_alike_say_that_the_depth_is_uncertain(names: tuple[str, ...]) -> None:
+    methods, centre = of_views(*names), np.array([15.0, -30.0, -12.0])
+    areas = {name: true_area(method, centre, 10.0) for name, method in methods.items()}
+    found = locate_in_breast({n: BreastInView(m, GRID) for n, m in methods.items()}, areas)
+    assert "hardly determine the depth" in found.message
+    across = found.point - centre
+    along = next(iter(methods.values())).deformation.matrix[2]
+    along = along / np.linalg.norm(along)
+    assert np.linalg.norm(across - along * (across @ along)) < 3.0
+
+
+def test_of_three_beams_the_two_that_cross_best_give_the_middle() -> None:
+    methods = of_views("CC", "FB", "ML")
+    places = {"CC": [0.0, -30.0, 0.0], "FB": [0.0, -30.0, 0.0], "ML": [0.0, -40.0, 0.0]}
+    areas = {name: true_area(method, np.array(places[name]), 6.0) for name, method in methods.items()}
+    found = locate_in_breast({n: BreastInView(m, GRID) for n, m in methods.items()}, areas)
+    assert found.region is None
+    assert found.beam_gap_mm == pytest.approx(10.0, abs=0.3)
+    np.testing.assert_allclose(found.point, [0.0, -35.0, 0.0], atol=0.6)
 
 
 @pytest.mark.parametrize("shrink", [1.0, 0.5])

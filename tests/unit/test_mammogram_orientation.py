@@ -13,6 +13,7 @@ from mammoreg.imaging.mammogram import analyse
 from mammoreg.imaging.mammogram_canonical import canonicalise
 from mammoreg.imaging.mammogram_frame import without_frame
 from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation
+from mammoreg.imaging.views import PROJECTIONS, VIEWS
 from tests.unit.mammogram_images import PIXEL_MM, breast_image
 
 
@@ -31,6 +32,17 @@ from tests.unit.mammogram_images import PIXEL_MM, breast_image
         ("A\\H", "R", "MLO", True, False),
         ("p\\fl", "R", "MLO", False, True),
         ("PL\\L", "R", "CC", False, True),
+        ("A\\F", "L", "ML", False, False),
+        ("P\\FL", "R", "ML", False, True),
+        ("P\\FR", "R", "ML", False, True),
+        ("A\\F", "L", "LM", True, False),
+        ("P\\H", "R", "LM", False, True),
+        ("A\\HL", "L", "LMO", False, False),
+        ("P\\FL", "R", "LMO", True, True),
+        ("A\\R", "L", "FB", True, False),
+        ("P\\R", "R", "FB", False, True),
+        ("A\\R", "L", "XCCL", False, False),
+        ("P\\L", "R", "XCCM", False, True),
     ],
 )
 def test_flips_of_the_contract(orientation, laterality, view, rows, columns):
@@ -171,3 +183,23 @@ def test_image_without_breast_is_refused(value):
 def test_constant_image_is_refused():
     with pytest.raises(DataError, match="no breast"):
         canonicalise(np.full((200, 150), 7), "L", "CC")
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("laterality", ["L", "R"])
+def test_letters_of_the_canonical_rows_follow_the_plate_frame(view, laterality):
+    """Rows follow (-s cos a, 0, -sin a) in LPS; what of it stands out is what the orientation's letters say."""
+    angle, s = np.deg2rad(PROJECTIONS[view].angle_deg), 1.0 if laterality == "L" else -1.0
+    x, z = -s * np.cos(angle), -np.sin(angle)
+    letters = "".join(letter for letter, share in (("L", x), ("R", -x), ("H", z), ("F", -z)) if share > 0.5)
+    assert flips_of_orientation(f"A\\{letters}", laterality, view) == Flips(rows=False, columns=False)
+    assert plate_rotation(PROJECTIONS[view].angle_deg)[0] == pytest.approx([-s * x, 0.0, z])
+
+
+@pytest.mark.parametrize(
+    ("view", "upright", "as_canonical"),
+    [("CC", False, True), ("MLO", True, True), ("ML", True, True), ("LM", True, False), ("LMO", True, False),
+     ("FB", False, False), ("XCCL", False, True)],
+)  # fmt: skip
+def test_how_views_are_hung(view, upright, as_canonical):
+    assert (PROJECTIONS[view].upright, PROJECTIONS[view].hung_as_canonical) == (upright, as_canonical)

@@ -1,7 +1,8 @@
-"""From the mammograms to the MR volume: where in the undeformed breast a lesion marked in one or two views lies."""
+"""From the mammograms to the MR volume: where in the undeformed breast a lesion lies that views mark."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ _CURVE_STEP_MM = 0.5
 _STRETCH = 1.8
 """Bound of the stretch between the plates, by which coarse cells are kept for a closer look."""
 DEPTH_UNKNOWN = "one view does not determine the depth of the lesion"
+LEAST_CROSSING_DEG = 20.0
+"""Below this an error across the beams is more than three times as large along them (chosen)."""
+DEPTH_UNCERTAIN = "the beams run nearly alike and hardly determine the depth of the lesion"
 _CELLS_ACROSS = 12
 _FINEST_LEVEL = 3
 
@@ -29,7 +33,7 @@ class MrPrediction:
         point: its centre (3,).
         region: the intersection of the back-projected tubes, None if empty.
         curves: per view the beam through the lesion's centre, carried back, points (N, 3).
-        beam_gap_mm: gap of the two curves at their closest approach, None for one view.
+        beam_gap_mm: widest gap of two curves at their closest approach, None for one view.
         message: empty, or what a reader must know of it.
     """
 
@@ -41,10 +45,11 @@ class MrPrediction:
 
 
 def locate_in_breast(views: Mapping[str, BreastInView], areas: Mapping[str, LesionArea]) -> MrPrediction:
-    """Locate a lesion marked in one or two views.
+    """Locate a lesion marked in one or several views.
 
-    Of two views the point is the centroid of the region where the back-projected areas meet or, where they do not, the
-    middle of the beams' closest approach; of one view the middle of its curve.
+    Of several views the point is the centroid of the region where the back-projected areas meet or, where they do not,
+    the middle of the closest approach of the two beams that cross at the largest angle; of one view the middle of its
+    curve.
 
     Args:
         views: by view name, all on one grid.
@@ -61,8 +66,10 @@ def locate_in_breast(views: Mapping[str, BreastInView], areas: Mapping[str, Lesi
     if len(names) == 1:
         notes.append(_depth_note(curves[names[0]]))
     region = back_projected_region([(views[name], areas[name]) for name in names])
-    midpoint, gap = _beams_meet(list(curves.values()))
+    midpoint, gap = _beams_meet(list(curves.values()), _crossing_deg(views, names))
     point = midpoint
+    if len(names) > 1 and (widest := float(_crossing_deg(views, names).max())) < LEAST_CROSSING_DEG:
+        notes.append(f"{DEPTH_UNCERTAIN}: those of {' and '.join(names)} cross at {widest:.0f} degrees")
     if len(names) > 1 and region is None:
         notes.append("the back-projected tubes do not meet, the point is midway between the beams")
     elif len(names) > 1 and region is not None:
@@ -75,11 +82,20 @@ def _depth_note(curve: Points) -> str:
     return f"{DEPTH_UNKNOWN}: it may lie anywhere on {length_mm:.0f} mm of the beam, the point is their middle"
 
 
-def _beams_meet(curves: list[Points]) -> tuple[Points, float | None]:
-    """Midway between two curves and their gap; of one curve the point at half its length, and None."""
+def _crossing_deg(views: Mapping[str, BreastInView], names: Sequence[str]) -> NDArray[np.float64]:
+    """Angles (N, N), 0 to 90 degrees, at which the beams of views cross; both directions of a beam are alike."""
+    angles = np.array([views[name].method.geometry.angle_deg for name in names])
+    turned = np.abs(angles[:, None] - angles[None, :]) % 180.0
+    return np.asarray(np.minimum(turned, 180.0 - turned))
+
+
+def _beams_meet(curves: list[Points], crossing_deg: NDArray[np.float64]) -> tuple[Points, float | None]:
+    """Midway between the two curves that cross best and the widest gap; of one curve half its length, and None."""
     if len(curves) == 1:
         return halfway(curves[0]), None
-    return closest_approach(curves[0], curves[1])
+    first, second = np.unravel_index(int(np.argmax(crossing_deg)), crossing_deg.shape)
+    gaps = [closest_approach(a, b)[1] for a, b in combinations(curves, 2)]
+    return closest_approach(curves[int(first)], curves[int(second)])[0], max(gaps)
 
 
 def centre_curve(view: BreastInView, pixel: NDArray[np.float64]) -> tuple[Points, float]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mammoreg.localization.to_mr import DEPTH_UNKNOWN
+from mammoreg.localization.to_mr import DEPTH_UNCERTAIN, DEPTH_UNKNOWN
 from mammoreg.metrics.summary import summarise
 from stages.engine.artefact import Artefact
 from stages.engine.completion import first_failures
@@ -84,9 +84,11 @@ def _warnings(artefacts: Sequence[Artefact]) -> list[str]:
 
 
 def _unknown_depths(artefacts: Sequence[Artefact]) -> list[str]:
-    """Lesions that one view alone shows."""
+    """Lesions that one view alone shows, or views along nearly one beam."""
     rows = [row for row in PREDICTIONS_MR.rows(artefacts) if row["method"] == SHOWN_METHOD]
-    return [f"{row['views']}, {row['name']}: {row['message']}" for row in rows if DEPTH_UNKNOWN in row["message"]]
+    unknown = (DEPTH_UNKNOWN, DEPTH_UNCERTAIN)
+    told = [row for row in rows if any(text in row["message"] for text in unknown)]
+    return [f"{row['views']}, {row['name']}: {row['message']}" for row in told]
 
 
 def _stray_marks(artefacts: Sequence[Artefact]) -> list[str]:
