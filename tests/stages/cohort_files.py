@@ -48,7 +48,7 @@ def write_dicom(path: Path, **elements: object) -> Path:
         "ViewPosition": "CC",
         "ImageLaterality": "R",
         "PatientOrientation": ["P", "L"],
-        "ImagerPixelSpacing": [0.2, 0.2],
+        "ImagerPixelSpacing": [1.0, 1.0],
         "BodyPartThickness": 50,
         "PhotometricInterpretation": "MONOCHROME2",
         "SamplesPerPixel": 1,

@@ -17,15 +17,15 @@ def _dicom(path, **changes):
     header.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
     header.SOPClassUID = header.file_meta.MediaStorageSOPClassUID = "1.2.840.10008.5.1.4.1.1.1.2"
     header.SOPInstanceUID = header.file_meta.MediaStorageSOPInstanceUID = generate_uid(entropy_srcs=["mammogram"])
-    pixels = np.zeros((40, 30), dtype=np.uint16)
-    pixels[5:35, 15:] = 900
+    pixels = np.zeros((600, 300), dtype=np.uint16)
+    pixels[50:350, 150:] = 900
     elements = {
         "Modality": "MG", "PatientName": "SECRET^NAME", "PatientID": "SECRET-ID",
         "ViewPosition": "CC", "ImageLaterality": "R", "PatientOrientation": ["P", "L"],
         "ImagerPixelSpacing": [0.1, 0.1], "BodyPartThickness": 55, "CompressionForce": 120,
         "PositionerPrimaryAngle": 0, "DistanceSourceToDetector": 660, "DistanceSourceToPatient": 640,
         "PresentationIntentType": "FOR PRESENTATION", "PhotometricInterpretation": "MONOCHROME2",
-        "SamplesPerPixel": 1, "Rows": 40, "Columns": 30, "BitsAllocated": 16, "BitsStored": 12, "HighBit": 11,
+        "SamplesPerPixel": 1, "Rows": 600, "Columns": 300, "BitsAllocated": 16, "BitsStored": 12, "HighBit": 11,
         "PixelRepresentation": 0, "PixelData": pixels.tobytes(),
     } | changes  # fmt: skip
     for keyword, value in elements.items():
@@ -39,7 +39,7 @@ def test_full_header(tmp_path):
     stored = read_mammogram(_dicom(tmp_path / "a.dcm"), {}, "R", "CC")
     facts = stored.facts
     assert stored.pixels.dtype == np.float32
-    assert stored.pixels[20, 20] == 900.0
+    assert stored.pixels[200, 200] == 900.0
     assert facts.orientation == "P\\L"
     assert (facts.pixel_mm, facts.thickness_mm, facts.force_n, facts.angle_deg) == (0.1, 55.0, 120.0, 0.0)
     assert (facts.source_detector_mm, facts.support_detector_mm) == (660.0, 20.0)
@@ -95,8 +95,8 @@ def test_pixel_spacing_in_the_patient_is_magnified_to_the_detector(tmp_path):
 
 
 def test_padding_counts_as_air(tmp_path):
-    pixels = np.full((40, 30), 5, dtype=np.uint16)
-    pixels[5:35, 15:], pixels[:, 0] = 900, 4000
+    pixels = np.full((600, 300), 5, dtype=np.uint16)
+    pixels[50:350, 150:], pixels[:, 0] = 900, 4000
     path = _dicom(tmp_path / "a.dcm", PixelData=pixels.tobytes(), PixelPaddingValue=4000)
     assert read_mammogram(path, {}, "R", "CC").pixels.max() == 900.0
 
@@ -125,6 +125,14 @@ def test_header_that_cannot_be_used(tmp_path, changes, words):
     assert "SECRET" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("spacing", "size"), [(0.01, "7 mm"), (1.0, "700 mm")])
+def test_a_scale_that_makes_no_mammogram_is_refused(tmp_path, spacing, size):
+    path = _dicom(tmp_path / "a.dcm", ImagerPixelSpacing=[spacing, spacing], Rows=700, Columns=100)
+    with pytest.raises(DataError, match=f"make an image of {size}"):
+        read_mammogram_facts(path, {}, "R", "CC")
+    assert read_mammogram_facts(path, {"pixel_spacing_mm": "0.3"}, "R", "CC").pixel_mm == 0.3
+
+
 def test_number_of_the_table_that_is_none(tmp_path):
     with pytest.raises(DataError, match=r"thickness_mm '5 cm' of a\.dcm is not a number"):
         read_mammogram_facts(_dicom(tmp_path / "a.dcm"), {"thickness_mm": "5 cm"}, "R", "CC")
@@ -134,7 +142,7 @@ def test_number_of_the_table_that_is_none(tmp_path):
 def test_unreadable_file(tmp_path, name):
     if name.startswith("text"):
         (tmp_path / name).write_text("no image")
-    with pytest.raises(DataError, match="cannot be read"):
+    with pytest.raises(DataError, match="cannot be (read|opened)"):
         read_mammogram(tmp_path / name, {}, "R", "CC")
 
 

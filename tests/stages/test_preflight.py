@@ -324,7 +324,7 @@ def test_mammogram_without_pixels(folder):
 def test_picture_that_ends_early(folder):
     noise = np.random.default_rng(1).integers(0, 255, (ROWS, COLUMNS), dtype=np.uint8)
     Image.fromarray(noise).save(folder / "cc.png")
-    view = {"case": "c1", "view": "CC", "image": "cc.png", "pixel_spacing_mm": "0.2", "lesion": "lesion.png"}
+    view = {"case": "c1", "view": "CC", "image": "cc.png", "pixel_spacing_mm": "1", "lesion": "lesion.png"}
     write_tsv(folder / "views.tsv", view)
     assert _faults(folder) == []
     _cut(folder / "cc.png", 0.6)

@@ -203,3 +203,10 @@ def test_letters_of_the_canonical_rows_follow_the_plate_frame(view, laterality):
 )  # fmt: skip
 def test_how_views_are_hung(view, upright, as_canonical):
     assert (PROJECTIONS[view].upright, PROJECTIONS[view].hung_as_canonical) == (upright, as_canonical)
+
+
+@pytest.mark.parametrize("view", ["LM", "LMO", "FB"])
+def test_views_that_are_stored_either_way_need_their_orientation(view):
+    with pytest.raises(DataError, match=f"orientation of a {view} view is unknown.*give the column 'orientation'"):
+        canonicalise(breast_image(), "L", view)
+    assert not canonicalise(breast_image(), "L", "ML").flips.rows

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.random import Generator
 
 from mammoreg.geometry import Volume, plate_to_breast
+from mammoreg.imaging.views import PROJECTIONS
+from mammoreg.imaging.views import View as Mammogram
 from mammoreg.meshing.trilinear import volumes
 from mammoreg.phantom.anatomy import Anatomy, Layers, Tissue, build_anatomy
 from mammoreg.phantom.compression import Press, Pressed
@@ -22,8 +24,8 @@ from mammoreg.phantom.mesh import PhantomMesh, breast_mesh
 from mammoreg.phantom.shape import Array, BreastShape, Torso
 from mammoreg.phantom.warp import Deformed
 
-View = Literal["CC", "MLO", "3D"]
-HEADER_ANGLE_DEG: dict[View, float] = {"CC": 0.0, "MLO": 45.0, "3D": 0.0}
+View = Mammogram | Literal["3D"]
+HEADER_ANGLE_DEG: dict[View, float] = {**{view: taken.angle_deg for view, taken in PROJECTIONS.items()}, "3D": 0.0}
 
 TORSO = {"half_width": (180.0, 200.0), "half_depth": (115.0, 135.0), "tilt": (0.03, 0.12)}
 VOLUME_CM3 = (250.0, 1000.0)
@@ -67,7 +69,11 @@ ROLL_DEG = (5.0, 8.0)
 EDGE_MM = (6.0, 12.0)
 PULL_MM = (4.0, 12.0)
 LIFT = (0.3, 0.7)
-SHARE: dict[View, tuple[float, float]] = {"CC": (0.46, 0.55), "MLO": (0.42, 0.51), "3D": (0.21, 0.21)}
+FLAT, UPRIGHT = (0.46, 0.55), (0.42, 0.51)
+SHARE: dict[View, tuple[float, float]] = {
+    **{view: UPRIGHT if taken.upright else FLAT for view, taken in PROJECTIONS.items()},
+    "3D": (0.21, 0.21),
+}
 LESION = LesionRule((8.0, 20.0), skin_mm=5.0, back_mm=20.0, nipple_mm=40.0, aside_mm=16.0, off_axis=(0.50, 0.90))
 LANDMARKS = {"skin_mm": 6.0, "back_mm": 10.0, "apart_mm": 10.0}
 MESH, COARSE = {"core": 8, "rows": 9, "shells": 3}, {"core": 4, "rows": 5, "shells": 1}

@@ -19,7 +19,7 @@ from stages.cohort.mark_checks import (
     check_view_landmarks,
     check_view_lesion,
 )
-from stages.cohort.readers.mammogram import is_picture, read_mammogram_facts
+from stages.cohort.readers.mammogram import image_size, is_picture, read_mammogram_facts
 from stages.cohort.readers.markups import UNKNOWN_DIAMETER_MM
 from stages.cohort.readers.mr import mr_choice, read_labels
 from stages.cohort.readers.mr_choice import MrChoice
@@ -58,6 +58,7 @@ def warnings_of(cohort: Cohort) -> list[str]:
     ]
     return [
         *odd,
+        *_view_notes(cohort),
         *(f"{where}: {note}" for where, choice in _mr_choices(cohort) for note in choice.notes),
         *(
             f"{where}: {what}; if they are of one woman all is well"
@@ -65,6 +66,17 @@ def warnings_of(cohort: Cohort) -> list[str]:
             if not sure
         ),
     ]
+
+
+def _view_notes(cohort: Cohort) -> Iterator[str]:
+    """What was noticed in reading the mammograms' headers; it stands in `trust` too."""
+    for view in cohort.mammograms.values():
+        try:
+            facts = read_mammogram_facts(view.image, view.values(), cohort.cases[view.case].laterality, view.view)
+        except DataError:
+            continue  # a fault, which is listed
+        where = f"{cohort.views_file.name if cohort.views_file else ''} ({view.case} {view.view})"
+        yield from (f"{where}, column image: {flag}" for flag in facts.flags)
 
 
 def choices_of(cohort: Cohort) -> list[str]:
@@ -181,32 +193,12 @@ def _check_image(path: Path, view: ViewRow, laterality: Any) -> None:
     facts = read_mammogram_facts(path, view.values(), laterality, view.view)
     if facts.pixel_mm is None:
         raise DataError(f"{path}: neither header nor table gives the pixel spacing; fill the column pixel_spacing_mm")
-    _image_size(path)
     (check_whole_picture if is_picture(path) else check_whole_dicom)(path)
 
 
 def _size_of(image: Path | None) -> tuple[int, int] | None:
     """Rows and columns of a mammogram; None without one, or where it has a fault of its own."""
     try:
-        return _image_size(image) if image and image.exists() else None
+        return image_size(image) if image and image.exists() else None
     except DataError:
         return None
-
-
-def _image_size(path: Path) -> tuple[int, int]:
-    """Rows and columns of a mammogram."""
-    if is_picture(path):
-        from PIL import Image, UnidentifiedImageError
-
-        try:
-            with Image.open(path) as picture:
-                return picture.height, picture.width
-        except (OSError, UnidentifiedImageError) as error:
-            raise DataError(f"{path}: cannot be read as a picture; export the image again") from error
-    from pydicom import dcmread
-
-    try:
-        header = dcmread(path, stop_before_pixels=True)
-        return int(header.Rows), int(header.Columns)
-    except Exception as error:  # pydicom raises many kinds for damaged bytes
-        raise DataError(f"{path}: the header gives no image size; export the image again") from error

@@ -16,16 +16,20 @@ from pydicom.uid import (
 
 from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.geometry.frames import Laterality
+from mammoreg.imaging.views import PROJECTIONS, View
 from stages.engine.contract import Subject
 from stages.formats.images import mask_png
 from stages.formats.nifti import nifti_bytes, volume_affine
 
-VIEW_CODES = {"CC": ("R-10242", "cranio-caudal"), "MLO": ("R-10226", "medio-lateral oblique")}
-ORIENTATION = {
-    ("L", "CC"): ["A", "R"],
-    ("R", "CC"): ["P", "L"],
-    ("L", "MLO"): ["A", "FR"],
-    ("R", "MLO"): ["P", "FL"],
+VIEW_CODES: dict[View, str] = {
+    "CC": "R-10242",
+    "MLO": "R-10226",
+    "ML": "R-10224",
+    "LM": "R-10228",
+    "LMO": "R-10230",
+    "XCCL": "R-1024A",
+    "XCCM": "R-1024B",
+    "FB": "R-10244",
 }
 
 
@@ -71,6 +75,14 @@ def points_tsv(names: Sequence[str], points: NDArray[np.float64], columns: tuple
     return ("\n".join(lines) + "\n").encode()
 
 
+def _orientation(laterality: Laterality, view: View) -> list[str]:
+    """PatientOrientation of an image as `_stored` turns it."""
+    sides = {"M": "R", "T": "L"} if laterality == "L" else {"M": "L", "T": "R"}
+    rows = sorted(PROJECTIONS[view].rows_towards - set(sides))
+    across = [sides[letter] for letter in PROJECTIONS[view].rows_towards if letter in sides]
+    return ["A" if laterality == "L" else "P", "".join([*rows, *across])]
+
+
 def _stored(image: NDArray[np.generic], laterality: Laterality) -> NDArray[np.generic]:
     """A canonical image (chest wall at column 0) as it is usually stored: a right breast's columns reversed."""
     return np.ascontiguousarray(image[:, ::-1] if laterality == "R" else image)
@@ -84,7 +96,7 @@ def stored_mask(mask: NDArray[np.bool_], laterality: Laterality) -> bytes:
 def mammogram_dicom(
     image: NDArray[np.uint16],
     subject: Subject,
-    view: str,
+    view: View,
     geometry: ViewGeometry,
     thickness_mm: float,
     force_n: float,
@@ -100,7 +112,7 @@ def mammogram_dicom(
     _describe_machine(dataset, geometry, view)
     dataset.BodyPartThickness = f"{thickness_mm:.0f}"
     dataset.CompressionForce = f"{force_n:.1f}"
-    dataset.PatientOrientation = ORIENTATION[subject.laterality, view]
+    dataset.PatientOrientation = _orientation(subject.laterality, view)
     _describe_pixels(dataset, pixels, geometry.pixel_mm, monochrome1)
     return _written(dataset)
 
@@ -126,20 +138,20 @@ def _identify(dataset: Dataset, subject: Subject, series: str, kind: UID, number
     dataset.ReferringPhysicianName, dataset.SeriesNumber, dataset.InstanceNumber = "", "1", str(number)
 
 
-def _describe_view(dataset: Dataset, subject: Subject, view: str) -> None:
+def _describe_view(dataset: Dataset, subject: Subject, view: View) -> None:
     dataset.ImageLaterality, dataset.ViewPosition = subject.laterality, view
     code = Dataset()
-    code.CodeValue, code.CodeMeaning = VIEW_CODES[view]
+    code.CodeValue, code.CodeMeaning = VIEW_CODES[view], PROJECTIONS[view].name
     code.CodingSchemeDesignator = "SRT"
     dataset.ViewCodeSequence = [code]
 
 
-def _describe_machine(dataset: Dataset, geometry: ViewGeometry, view: str) -> None:
+def _describe_machine(dataset: Dataset, geometry: ViewGeometry, view: View) -> None:
     dataset.Modality, dataset.PresentationIntentType = "MG", "FOR PRESENTATION"
     dataset.ImageType = ["DERIVED", "PRIMARY"]
     dataset.Manufacturer, dataset.BodyPartExamined = "digital patient (simulated)", "BREAST"
     dataset.DetectorType, dataset.PositionerType = "DIRECT", "MAMMOGRAPHIC"
-    dataset.PositionerPrimaryAngle = "0" if view == "CC" else "45"
+    dataset.PositionerPrimaryAngle = f"{PROJECTIONS[view].angle_deg:.0f}"
     dataset.DistanceSourceToDetector = f"{geometry.source_detector_mm:.0f}"
     dataset.DistanceSourceToPatient = f"{geometry.source_detector_mm - geometry.support_detector_mm:.0f}"
     dataset.EstimatedRadiographicMagnificationFactor = f"{geometry.middle_magnification:.4f}"

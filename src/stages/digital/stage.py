@@ -7,6 +7,7 @@ from pydantic import Field
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, Volume, breast_to_lps, breast_to_plate
+from mammoreg.imaging.views import View as Mammogram
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.mammogram import Exposure, Pectoral, presented, project
 from mammoreg.phantom.mri import T1, T1_FAT_SUPPRESSED, Acquisition, acquire
@@ -22,7 +23,6 @@ MR_MM, PIXEL_MM, ROWS, COLUMNS = 1.4, 0.2, 1300, 900
 SOURCE_DETECTOR_MM, SUPPORT_DETECTOR_MM = 650.0, 15.0
 OFF_CENTRE_MM, BEHIND_EDGE_MM = 8.0, 12.0
 HEADER_THICKNESS_OFF_MM = 2.0
-MAMMOGRAMS: tuple[View, ...] = ("CC", "MLO")
 LANDMARKS, VOLUNTEER_LANDMARKS, SURFACE_POINTS = 30, 17, 16
 EXPOSURE = Exposure(photons=4.0e4, scatter=0.35, scatter_mm=10.0, blur_mm=0.15, equalisation=0.6)
 NOISE, FAT_SUPPRESSED_NOISE, BIAS = 22.0, 14.0, 0.5
@@ -33,7 +33,7 @@ class DigitalPatient(SettingsModel):
 
     seed: int = Field(ge=0, description="Seed of everything about her.")
     kind: Literal["clinical", "volunteer"] = Field(
-        "clinical", description="clinical: mammograms CC and MLO; volunteer: a second MR volume between the plates."
+        "clinical", description="clinical: mammograms; volunteer: a second MR volume between the plates."
     )
     fat_suppressed: bool = Field(False, description="Whether the MR volume is fat-suppressed.")
     both_breasts: bool = Field(False, description="Whether the MR volume shows both breasts.")
@@ -41,7 +41,8 @@ class DigitalPatient(SettingsModel):
         "nifti", description="Form of the MR volume: NIfTI, NIfTI of sagittal planes, or a folder with a DICOM series."
     )
     monochrome1: bool = Field(False, description="Whether the mammograms are stored inverted (MONOCHROME1).")
-    unseen_views: tuple[Literal["CC", "MLO"], ...] = Field((), description="Views without a visible lesion.")
+    views: tuple[Mammogram, ...] = Field(("CC", "MLO"), description="Mammograms of a clinical patient.")
+    unseen_views: tuple[Mammogram, ...] = Field((), description="Views without a visible lesion.")
 
 
 class Settings(SettingsModel):
@@ -70,7 +71,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
         return Making(
             subject, chosen, Patient.draw(chosen.seed, (SECOND_VOLUME,), True, VOLUNTEER_LANDMARKS)
         ).volunteer()
-    return Making(subject, chosen, Patient.draw(chosen.seed, MAMMOGRAMS, False, LANDMARKS)).clinical()
+    return Making(subject, chosen, Patient.draw(chosen.seed, chosen.views, False, LANDMARKS)).clinical()
 
 
 def mr_files(volume: Volume, chosen: DigitalPatient, subject: Subject) -> dict[str, bytes]:
@@ -94,7 +95,7 @@ class Making:
         self.names = [f"P{n + 1:02d}" for n in range(len(patient.landmarks))]
 
     def clinical(self) -> Fields:
-        """MR with lesion and landmarks, two mammograms with theirs."""
+        """MR with lesion and landmarks, mammograms with theirs."""
         self._undeformed_mr()
         lesion = self.patient.lesion
         assert lesion is not None
@@ -105,7 +106,7 @@ class Making:
         volume = grid.with_data(mask.astype(np.uint8))
         self.files["mr_lesion.nii.gz"] = nifti(volume, self.subject.laterality, sagittal)
         self._note("lesion_centre", lesion.centre[None], "mm", "centre of the lesion, undeformed")
-        for number, view in enumerate(self.patient.placements):
+        for number, view in enumerate(self.chosen.views):
             self._mammogram(view, number)
         return Fields(self.arrays, {}, self.values, self.files)
 
@@ -135,7 +136,7 @@ class Making:
         self._note("nodes", patient.mesh.points, "mm", "nodes of the truth's mesh, undeformed")
         self.arrays["hexes"] = Array(patient.mesh.hexes, "1", "corners of its elements, VTK order in the breast frame")
 
-    def _mammogram(self, view: View, number: int) -> None:
+    def _mammogram(self, view: Mammogram, number: int) -> None:
         patient, random = self.patient, self.patient.stream(20 + number)
         pressed, deformed = patient.pressed(view)
         imaged = pressed.deformed[:, 1] < patient.placements[view].edge_p_mm + BEHIND_EDGE_MM

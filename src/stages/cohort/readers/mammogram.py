@@ -8,17 +8,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from pydicom import dcmread
 from pydicom.dataset import Dataset
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.views import View
+from stages.cohort.readers.dicom_headers import read_dicom
+from stages.cohort.readers.header_values import number, texts
 from stages.cohort.readers.mammogram_header import MammogramFacts, mammogram_facts
 from stages.cohort.readers.mammogram_kind import lift_frame_values, other_kind
 from stages.cohort.readers.outside import with_air_outside
 
 PICTURES = (".png", ".tif", ".tiff")
+EXTENT_MM = (40.0, 600.0)
+"""Longer side of a mammogram (chosen: detectors have 180 to 430 mm, and a crop is smaller)."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,11 @@ def read_mammogram(path: Path, row: Mapping[str, str], laterality: Laterality, v
     Raises:
         DataError: If the file cannot be read, is no mammogram, or contradicts the table.
     """
-    if is_picture(path):
-        return StoredMammogram(_picture_pixels(path), mammogram_facts(path, Dataset(), row, laterality, view))
-    header = _read_dicom(path, pixels=True)
+    header = Dataset() if is_picture(path) else _read_dicom(path, pixels=True)
     facts = mammogram_facts(path, header, row, laterality, view)
-    return StoredMammogram(_dicom_pixels(path, header, facts.linear), facts)
+    pixels = _picture_pixels(path) if is_picture(path) else _dicom_pixels(path, header, facts.linear)
+    _check_extent(path, pixels.shape, facts.pixel_mm)
+    return StoredMammogram(pixels, facts)
 
 
 def read_mammogram_facts(path: Path, row: Mapping[str, str], laterality: Laterality, view: View) -> MammogramFacts:
@@ -58,7 +61,43 @@ def read_mammogram_facts(path: Path, row: Mapping[str, str], laterality: Lateral
         DataError: As `read_mammogram`, but for faults of the pixels.
     """
     header = Dataset() if is_picture(path) else _read_dicom(path, pixels=False)
-    return mammogram_facts(path, header, row, laterality, view)
+    facts = mammogram_facts(path, header, row, laterality, view)
+    _check_extent(path, image_size(path), facts.pixel_mm)
+    return facts
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Rows and columns of a mammogram by its header.
+
+    Raises:
+        DataError: it tells none.
+    """
+    if is_picture(path):
+        try:
+            with Image.open(path) as picture:
+                return picture.height, picture.width
+        except (OSError, SyntaxError, ValueError) as error:
+            raise DataError(f"{path}: cannot be read as a picture; export the image again") from error
+    header = _read_dicom(path, pixels=False)
+    size = [one.value for key in ("Rows", "Columns") if (one := number("".join(texts(header, key)[:1]))) is not None]
+    if len(size) < 2 or min(size) < 1.0:
+        raise DataError(f"{path}: the header gives no image size; export the image again")
+    return int(size[0]), int(size[1])
+
+
+def _check_extent(path: Path, shape: tuple[int, ...], pixel_mm: float | None) -> None:
+    """Refuse a scale at which the image is no mammogram's size.
+
+    Raises:
+        DataError: with the remedy.
+    """
+    low, high = EXTENT_MM
+    longest = max(shape) * pixel_mm if pixel_mm is not None else None
+    if longest is not None and not low <= longest <= high:
+        raise DataError(
+            f"{path}: {max(shape)} pixels of {pixel_mm:g} mm make an image of {longest:.0f} mm, and a mammogram has "
+            f"{low:.0f} to {high:.0f} mm; correct the pixel spacing or give the column pixel_spacing_mm"
+        )
 
 
 def is_picture(path: Path) -> bool:
@@ -67,11 +106,10 @@ def is_picture(path: Path) -> bool:
 
 
 def _read_dicom(path: Path, *, pixels: bool) -> Dataset:
-    try:
-        header = dcmread(path, stop_before_pixels=not pixels)
-        lift_frame_values(header)
-    except Exception as error:  # pydicom raises many kinds for a damaged file
-        raise DataError(f"{path}: cannot be read as DICOM; name a DICOM mammogram, a .png or a .tif") from error
+    header = read_dicom(path, pixels=pixels)
+    if header is None:
+        raise DataError(f"{path}: cannot be read as DICOM; name a DICOM mammogram, a .png or a .tif")
+    lift_frame_values(header)
     if found := other_kind(header):
         raise DataError(f"{path}: {found}")
     return header
@@ -82,7 +120,7 @@ def _dicom_pixels(path: Path, header: Dataset, linear: bool) -> NDArray[np.float
         pixels = np.asarray(header.pixel_array)
     except (NotImplementedError, RuntimeError):
         pixels = _decoded_by_itk(path)
-    except Exception as error:  # as above
+    except Exception as error:  # pydicom raises many kinds for damaged pixels
         raise DataError(f"{path}: pixels are missing or truncated; export the image again") from error
     return with_air_outside(_one_channel(path, pixels), header, linear)
 

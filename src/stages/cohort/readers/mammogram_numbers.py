@@ -131,7 +131,7 @@ class Numbers:
         """All values of an element; None where one is no number."""
         found = [number(value) for value in written]
         values = tuple(one.value for one in found if one is not None)
-        remark = f"{keyword} {quoted(tuple(written))} read with a decimal comma"
+        remark = f"{keyword} {' x '.join(written)} read with a decimal comma"
         if any(one is not None and one.comma for one in found) and remark not in self.flags:
             self.flags.append(remark)
         return values if len(values) == len(found) else None
