@@ -6,7 +6,7 @@ image as it is stored, counted from the centre of the first one. The same functi
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,8 @@ from mammoreg.meshing.breast import build_mesh
 from mammoreg.meshing.fractions import gland_fraction
 from mammoreg.metrics.distances import breast_scale_mm
 from mammoreg.pose.dense_tissue import dense_tissue
-from mammoreg.pose.outlined import OutlinedMammogram, outlined_mammogram
+from mammoreg.pose.outlined import OutlinedMammogram, outlined_mammograms
+from mammoreg.pose.row_order import pose_in_order
 from mammoreg.pose.search import PoseSearch, find_pose
 from mammoreg.shape.surface import ShapeOptions, drawn_surface
 
@@ -117,12 +118,14 @@ class RegisteredView:
         mammogram: as it was analysed.
         method: the deformation and the geometry of the view.
         closed: the breast between the plates before its outline was met, with forces and report.
+        doubts: what speaks against the order of rows in which an image without orientation was taken, in words.
     """
 
     breast: Breast
     mammogram: OutlinedMammogram
     method: MethodView
     closed: Closed
+    doubts: tuple[str, ...] = ()
 
     @property
     def geometry(self) -> ViewGeometry:
@@ -218,9 +221,12 @@ def register(
     """
     mechanics = mechanics if mechanics is not None else BreastMechanics()
     mu_kpa = mu_kpa if mu_kpa is not None else mu_for_force_kpa(SULLIVAN.median_n, HIGH_COMPRESSION)
-    seen = outlined_mammogram(mammogram, breast.laterality)
+    orders = outlined_mammograms(mammogram, breast.laterality)
     tissue = dense_tissue(breast.labels, breast.mask, breast.mesh)
-    pose = find_pose(seen.view, breast.mesh, mechanics, mu_kpa, tissue, search if search is not None else PoseSearch())
+    how = search if search is not None else PoseSearch()
+    find = partial(find_pose, mesh=breast.mesh, mechanics=mechanics, mu_kpa=mu_kpa, tissue=tissue, search=how)
+    posed = pose_in_order(orders, find, breast.laterality, mammogram.view)
+    seen, pose = orders[posed.chosen], posed.found
     if pose.estimate is None:
         raise NotConvergedError("the coarse compression converged at none of the angles tried, so the pose is unknown")
     view = pose.estimate.view
@@ -228,7 +234,9 @@ def register(
     prepared = prepare_compression(breast.mesh, view, mechanics, mu_kpa, gland)
     closed = prepared.closing.close(view.thickness_mm)
     deformed = _between_plates(breast.mesh, prepared, closed, view, seen)
-    return RegisteredView(breast, seen, MethodView(MeshDeformation(breast.reference, deformed), view), closed)
+    return RegisteredView(
+        breast, seen, MethodView(MeshDeformation(breast.reference, deformed), view), closed, posed.doubts
+    )
 
 
 def _between_plates(

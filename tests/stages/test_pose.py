@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from mammoreg.errors import NotConvergedError
 from mammoreg.fem.plates.closing import Closing
 from mammoreg.geometry.frames import plate_rotation
 from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose import start
+from mammoreg.pose.row_order import ORDER_ASSUMED
 from mammoreg.pose.thickness import ThicknessEstimate
 from stages.engine.artefact import write_artefact
 from stages.mesh.record import mesh_fields
@@ -58,6 +60,37 @@ def test_left_breast_has_the_same_pose(found, tmp_path):
     other = run("pose", tmp_path / "out", left, row=ROW | {"orientation": "A\\R"}, side="L")
     for name in ("angle_deg", "edge_p_mm", "middle_mm", "height_mm", "rigid_edge_p_mm", "rigid_middle_mm"):
         assert other.value(name) == pytest.approx(found.value(name), abs=1e-6), name
+
+
+def _picture(path, turned):
+    stored = np.asarray(Image.open(write_mammogram(path)))
+    Image.fromarray(np.ascontiguousarray(stored[::-1, ::-1] if turned else stored)).save(path)
+    return path
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_row_order_of_a_picture_without_orientation_is_told_by_its_dense_tissue(inputs, tmp_path, turned):
+    row = {name: text for name, text in ROW.items() if name != "orientation"}
+    picture = inputs | {"image": _picture(tmp_path / "cc.png", turned)}
+    got = run("pose", tmp_path / "out", picture, {"angle_step_deg": 0.0}, row=row)
+    assert got.ok, got.message
+    assert (got.value("flip_rows"), got.value("flip_columns")) == (turned, not turned)
+    assert got.value("middle_mm") == pytest.approx(MIDDLE, abs=1.5)
+    assert "orientation" in got.value("estimated")
+    assert ORDER_ASSUMED not in got.value("flags")
+
+
+def test_row_order_that_nothing_tells_is_assumed_as_usual_or_asked_for(inputs, tmp_path):
+    row = {name: text for name, text in ROW.items() if name != "orientation"}
+    alone = {"angle_step_deg": 0.0, "use_density": False}  # the outline of this breast is the same both ways
+    usual = run("pose", tmp_path, inputs, alone, row=row)
+    assert usual.ok, usual.message
+    assert ORDER_ASSUMED in usual.value("flags")
+    assert not usual.value("flip_rows")
+    turned = inputs | {"image": _picture(tmp_path / "cc.png", True)}
+    other = run("pose", tmp_path / "out", turned, alone, row=row)
+    assert other.status == "failed"
+    assert all(words in other.message for words in ("column 'orientation'", r"A\L if", r"A\R if"))
 
 
 def test_missing_thickness_is_estimated_and_marked(inputs, tmp_path):

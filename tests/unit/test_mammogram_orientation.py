@@ -12,7 +12,7 @@ from mammoreg.geometry.frames import plate_rotation
 from mammoreg.imaging.mammogram import analyse
 from mammoreg.imaging.mammogram_canonical import canonicalise
 from mammoreg.imaging.mammogram_frame import without_frame
-from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation
+from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation, orientation_of_flips
 from mammoreg.imaging.views import PROJECTIONS, VIEWS
 from tests.unit.mammogram_images import PIXEL_MM, breast_image
 
@@ -47,6 +47,13 @@ from tests.unit.mammogram_images import PIXEL_MM, breast_image
 )
 def test_flips_of_the_contract(orientation, laterality, view, rows, columns):
     assert flips_of_orientation(orientation, laterality, view) == Flips(rows, columns)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("laterality", ["L", "R"])
+def test_orientation_of_flips_is_read_back_as_these_flips(laterality, view):
+    for flips in (Flips(rows, columns) for rows in (False, True) for columns in (False, True)):
+        assert flips_of_orientation(orientation_of_flips(flips, laterality, view), laterality, view) == flips
 
 
 def test_rows_as_usually_stored_follow_the_plate_frame_towards_medial():

@@ -39,6 +39,7 @@ def canonicalise(
     orientation: str | None = None,
     photometric: str | None = None,
     linear: bool = False,
+    turned: bool = False,
 ) -> CanonicalMammogram:
     """Bring a stored mammogram into canonical orientation and polarity.
 
@@ -48,6 +49,7 @@ def canonicalise(
             run as usually stored, lateral or superior first; LM, LMO and FB need it.
         photometric: PhotometricInterpretation, or None: then the air at the border decides.
         linear: True where grey values are proportional to exposure (unprocessed data), which takes a logarithm.
+        turned: without an orientation, take rows to run the other way.
 
     Raises:
         DataError: If no breast is seen, the orientation must be known and is not, or the image contradicts it or its
@@ -55,7 +57,7 @@ def canonicalise(
     """
     framed = without_frame(stored)
     air = find_air(framed)
-    flips = _flips(air, orientation, laterality, view)
+    flips = _flips(air, orientation, laterality, view, turned)
     _refuse_contradiction(photometric, air, linear)
     pixels = _dense_bright(framed, air, linear)
     missing = {"orientation": orientation, "polarity": photometric}
@@ -64,10 +66,10 @@ def canonicalise(
     return CanonicalMammogram(canonical, find_air(canonical), flips, estimated)
 
 
-def _flips(air: Air, orientation: str | None, laterality: Laterality, view: View) -> Flips:
+def _flips(air: Air, orientation: str | None, laterality: Laterality, view: View, turned: bool) -> Flips:
     if orientation is None:
         check_usual(view)
-        return Flips(rows=False, columns=air.side == "left")
+        return Flips(rows=turned, columns=air.side == "left")
     flips = flips_of_orientation(orientation, laterality, view)
     if flips.chest_wall_side == air.side:
         raise DataError(

@@ -79,6 +79,19 @@ def flips_of_orientation(orientation: str, laterality: Laterality, view: View) -
     return Flips(rows=_rows_run_backwards(column_letters, orientation, laterality, view), columns="P" in row_letters)
 
 
+def orientation_of_flips(flips: Flips, laterality: Laterality, view: View) -> str:
+    r"""PatientOrientation, such as ``A\FR``, of an image that these flips make canonical."""
+    forwards = sorted(_rows_towards(laterality, view))
+    letters = [_OPPOSITE[letter] for letter in forwards] if flips.rows else forwards
+    return f"{'P' if flips.columns else 'A'}\\{''.join(letters)}"
+
+
+def _rows_towards(laterality: Laterality, view: View) -> frozenset[str]:
+    """Letters of the directions in which canonical rows run."""
+    across = {"M": "R", "T": "L"} if laterality == "L" else {"M": "L", "T": "R"}
+    return frozenset(across.get(letter, letter) for letter in PROJECTIONS[view].rows_towards)
+
+
 def _two_directions(orientation: str) -> tuple[str, str]:
     parts = [part.strip().upper() for part in orientation.replace("/", "\\").split("\\")]
     valid = len(parts) == 2 and all(parts) and all(_is_direction(part) for part in parts)
@@ -96,8 +109,7 @@ def _is_direction(letters: str) -> bool:
 
 
 def _rows_run_backwards(letters: str, orientation: str, laterality: Laterality, view: View) -> bool:
-    across = {"M": "R", "T": "L"} if laterality == "L" else {"M": "L", "T": "R"}
-    forwards = {across.get(letter, letter) for letter in PROJECTIONS[view].rows_towards}
+    forwards = _rows_towards(laterality, view)
     backwards = {_OPPOSITE[letter] for letter in forwards}
     towards, away = set(letters) & forwards, set(letters) & backwards
     if bool(towards) == bool(away):

@@ -46,8 +46,23 @@ class OutlinedMammogram:
     view: OutlinedView
 
 
-def outlined_mammogram(mammogram: Mammogram, laterality: Laterality) -> OutlinedMammogram:
+def outlined_mammograms(mammogram: Mammogram, laterality: Laterality) -> tuple[OutlinedMammogram, ...]:
+    """The mammogram as its orientation tells, or, without one, in both orders of its rows, the usual one first.
+
+    Raises:
+        DataError: as `outlined_mammogram`.
+    """
+    orders = (False,) if mammogram.orientation is not None else (False, True)
+    return tuple(outlined_mammogram(mammogram, laterality, turned) for turned in orders)
+
+
+def outlined_mammogram(mammogram: Mammogram, laterality: Laterality, turned: bool = False) -> OutlinedMammogram:
     """Turn a mammogram into canonical orientation and find breast, outline, dense tissue and nipple.
+
+    Args:
+        mammogram: as stored.
+        laterality: of the breast.
+        turned: take rows to run the other way than usually; only without an orientation.
 
     Raises:
         DataError: the image shows no usable breast, or contradicts its orientation.
@@ -59,6 +74,7 @@ def outlined_mammogram(mammogram: Mammogram, laterality: Laterality) -> Outlined
         orientation=mammogram.orientation,
         photometric=mammogram.photometric,
         linear=mammogram.linear,
+        turned=turned,
     )
     found, geometry = analyse(image.pixels, mammogram.pixel_mm, mammogram.view), mammogram.geometry()
     breast = found.mask if found.pectoral is None else found.mask & ~found.pectoral

@@ -1,6 +1,7 @@
 """Stage `pose`: where the breast lay between the plates: projection angle, imaged portion and plates (section III)."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from pydantic import Field
@@ -12,6 +13,7 @@ from mammoreg.meshing.block import BlockMesh
 from mammoreg.pose.dense_tissue import dense_tissue
 from mammoreg.pose.estimate import PoseEstimate
 from mammoreg.pose.outlined import OutlinedView
+from mammoreg.pose.row_order import pose_in_order
 from mammoreg.pose.search import FoundPose, PoseSearch, find_pose
 from stages.calibrate.record import CalibrateRecord
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
@@ -20,7 +22,7 @@ from stages.mesh.record import MeshRecord
 from stages.pose.affine import affine_maps, rigid_geometry
 from stages.pose.record import PoseFields
 from stages.pose.size import check_imaged_volume, check_size
-from stages.pose.view_facts import ViewFacts, facts_of_mammogram, facts_of_second_volume
+from stages.pose.view_facts import ViewFacts, facts_of_mammogram, facts_of_second_volume, view_of
 from stages.pose.without_image import without_image
 from stages.segment.record import SegmentRecord
 
@@ -62,20 +64,27 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Estimate the pose of one view."""
     segment, mesh = SegmentRecord(inputs.artefact("segment")), MeshRecord(inputs.artefact("mesh")).block
     image, second = inputs.path("image"), segment.compressed_mask
-    if image is not None:
-        facts = facts_of_mammogram(image, subject)
-    elif second is not None:
-        facts = facts_of_second_volume(second)
-    else:
-        return without_image(mesh, subject)
-    shown, odd = check_imaged_volume(facts, segment)
     mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
-    dense = settings.use_density and not facts.seen.placed
-    tissue = dense_tissue(segment.labels, segment.breast_mask, mesh) if dense else None
-    search = PoseSearch(settings.angle_step_deg, settings.angle_bound_deg, settings.angle_sd_deg)
-    found = find_pose(facts.seen, mesh, settings.mechanics.numerics(), mu_kpa, tissue, search)
-    facts = replace(facts, flags=(*facts.flags, *odd), values={**facts.values, **shown})
-    return _fields(facts, mesh, segment.nipple, found)
+    dense = settings.use_density and image is not None
+    find = partial(
+        find_pose,
+        mesh=mesh,
+        mechanics=settings.mechanics.numerics(),
+        mu_kpa=mu_kpa,
+        tissue=dense_tissue(segment.labels, segment.breast_mask, mesh) if dense else None,
+        search=PoseSearch(settings.angle_step_deg, settings.angle_bound_deg, settings.angle_sd_deg),
+    )
+    if image is None:
+        if second is None:
+            return without_image(mesh, subject)
+        facts = facts_of_second_volume(second)
+        return _fields(facts, mesh, segment.nipple, find(facts.seen))
+    shown, orders = facts_of_mammogram(image, subject)
+    sizes = [check_imaged_volume(facts, segment) for facts in shown]
+    posed = pose_in_order(orders, find, subject.laterality, view_of(subject))
+    facts, (size, odd) = shown[posed.chosen], sizes[posed.chosen]
+    facts = replace(facts, flags=(*facts.flags, *posed.doubts, *odd), values={**facts.values, **size})
+    return _fields(facts, mesh, segment.nipple, posed.found)
 
 
 def _doubts(facts: ViewFacts, found: FoundPose) -> tuple[str, ...]:

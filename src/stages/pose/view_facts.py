@@ -11,12 +11,13 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.acquisition import Mammogram
 from mammoreg.imaging.mammogram import MammogramAnalysis
-from mammoreg.imaging.views import VIEWS
-from mammoreg.pose.outlined import OUTLINE_RAYS, OutlinedView, outlined_mammogram
+from mammoreg.imaging.views import VIEWS, View
+from mammoreg.pose.outlined import OUTLINE_RAYS, OutlinedMammogram, OutlinedView, outlined_mammograms
 from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
 from mammoreg.pose.silhouette import ray_angles
 from stages.cohort.readers.mammogram import read_mammogram
+from stages.cohort.readers.mammogram_header import MammogramFacts
 from stages.engine.contract import Subject, Value
 from stages.pose.record import ImageOutline, ImageStorage
 
@@ -48,13 +49,13 @@ class ViewFacts:
     values: dict[str, Value] = field(default_factory=dict)
 
 
-def facts_of_mammogram(path: Path, subject: Subject) -> ViewFacts:
-    """Read and analyse a mammogram.
+def facts_of_mammogram(path: Path, subject: Subject) -> tuple[tuple[ViewFacts, ...], tuple[OutlinedMammogram, ...]]:
+    """Read and analyse a mammogram, in both orders of its rows where its orientation is not known, the usual first.
 
     Raises:
         DataError: the image cannot be used, or its pixel spacing is unknown.
     """
-    view = next(name for name in VIEWS if name == subject.view)
+    view = view_of(subject)
     stored = read_mammogram(path, subject.row, subject.laterality, view)
     facts = stored.facts
     if facts.pixel_mm is None:
@@ -71,7 +72,16 @@ def facts_of_mammogram(path: Path, subject: Subject) -> ViewFacts:
         facts.photometric,
         facts.linear,
     )
-    outlined = outlined_mammogram(mammogram, subject.laterality)
+    orders = outlined_mammograms(mammogram, subject.laterality)
+    return tuple(_facts(outlined, facts) for outlined in orders), orders
+
+
+def view_of(subject: Subject) -> View:
+    """The mammogram's view of a stage's subject."""
+    return next(name for name in VIEWS if name == subject.view)
+
+
+def _facts(outlined: OutlinedMammogram, facts: MammogramFacts) -> ViewFacts:
     image, found = outlined.image, outlined.found
     rows, columns = image.pixels.shape
     return ViewFacts(
