@@ -11,6 +11,7 @@ from pydicom.uid import JPEG2000, JPEGLSLossless, RLELossless
 from mammoreg.errors import DataError
 from stages.cohort.readers.mr import mr_choice, read_mr
 from stages.cohort.readers.mr_header import read_mr_grid
+from stages.cohort.readers.whole import check_whole_mr
 from tests.shared_data import DATA, requires_shared
 from tests.stages.mr_series import (
     ROWS,
@@ -325,6 +326,36 @@ def test_jpeg_lossless_that_pydicom_leaves_to_gdcm(tmp_path):
         header.save_as(tmp_path / "packed" / f"{number}", enforce_file_format=True)
     assert header.file_meta.TransferSyntaxUID.is_compressed
     assert np.array_equal(read_mr(tmp_path / "packed").data, read_mr(tmp_path / "plain").data)
+
+
+@pytest.mark.parametrize("end", [0, -1])
+def test_an_end_slice_with_another_header_is_remarked(tmp_path, end):
+    slices = series("t1")
+    slices[end].EchoTime = 99.0
+    write(tmp_path, slices)
+    assert read_mr(tmp_path).shape == (10, 12, 8)
+    assert "1 single pictures would continue the MR series" in mr_choice(tmp_path, "R").notes[0]
+
+
+def test_headers_of_random_bytes_end_in_words(tmp_path):
+    """Whatever a damaged header makes of itself is a volume or a fault that says so, never another exception."""
+    rng = np.random.default_rng(5)
+    write(tmp_path, series("t1"))
+    path = sorted(tmp_path.iterdir())[4]
+    whole = path.read_bytes()
+    said = []
+    for _ in range(120):
+        spoilt = bytearray(whole)
+        for place in rng.integers(128, 1400, size=4):
+            spoilt[place] = rng.integers(0, 256)
+        path.write_bytes(bytes(spoilt))
+        try:
+            check_whole_mr(tmp_path, "R")
+            read_mr(tmp_path, "R")
+        except DataError as error:
+            said.append(str(error))
+    assert len(said) > 40
+    assert all(text.startswith(str(tmp_path)) for text in said)
 
 
 def test_a_link_without_a_file_is_named(tmp_path):

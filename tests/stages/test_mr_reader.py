@@ -120,6 +120,8 @@ HEADERS = {
     ),
     "spacing that is no number": ("<f", 80, float("nan"), "voxel spacing is nan"),
     "affine that is no number": ("<f", 280, float("nan"), "nan"),
+    "affine that leads to the moon": ("<f", 292, 4e8, "4e.08 mm from the scanner's centre"),
+    "code of an orientation that there is none": ("<h", 254, 46, "gives no orientation"),
     "flat affine": ("<f", 280 + 20, 0.0, "spacing"),
     "colours": ("<h", 70, 128, "not grey values|cannot be read"),
     "wrong magic": ("4s", 344, b"abc\0", "cannot be read as NIfTI"),
@@ -155,6 +157,20 @@ def test_damage_in_a_compressed_volume_is_no_traceback(tmp_path: Path, share: fl
 
     with pytest.raises(DataError, match="mr.nii.gz"):
         looked_at()
+
+
+def test_two_places_in_one_header_are_refused(tmp_path: Path) -> None:
+    """Programs differ in whether they take sform or qform, so that marks set in one would lie elsewhere in another."""
+    image = nibabel.Nifti1Image(np.ones((10, 10, 10), np.float32), np.diag([1.5, 1.5, 2.0, 1.0]))
+    image.set_qform(image.affine, code=1)
+    nibabel.save(image, tmp_path / "same.nii")
+    assert read_mr_grid(tmp_path / "same.nii").shape == (10, 10, 10)
+    moved = image.affine.copy()
+    moved[0, 3] = 25.0
+    image.set_qform(moved, code=1)
+    nibabel.save(image, tmp_path / "two.nii")
+    with pytest.raises(DataError, match="two places, up to 25 mm apart"):
+        read_mr_grid(tmp_path / "two.nii")
 
 
 def test_several_volumes_in_one_file_are_refused_by_name(tmp_path: Path) -> None:

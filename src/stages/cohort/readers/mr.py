@@ -13,6 +13,7 @@ from stages.cohort.readers.mr_choice import MrChoice
 from stages.cohort.readers.mr_folder import choose_mr
 from stages.cohort.readers.mr_header import is_mr_dicom, read_mr_grid
 from stages.cohort.readers.mr_voxels import stack_voxels
+from stages.cohort.readers.nifti_header import LPS_OF_RAS, load_nifti
 
 LABEL_ROUNDING = 1e-3
 """A header's scale factor may take labels off whole numbers by this much."""
@@ -91,15 +92,12 @@ def read_labels(path: Path) -> Volume:
 
 def _nifti_voxels(path: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:
     """Voxels and the affine to LPS of a NIfTI file whose header was checked."""
-    import nibabel
-
+    image = load_nifti(path)
     try:
-        image: Any = nibabel.load(path)
         data = np.asanyarray(image.dataobj)
-        affine = np.diag([-1.0, -1.0, 1.0, 1.0]) @ image.affine
     except Exception as error:  # what decompresses and what scales have exceptions of their own
         raise DataError(f"{path}: the voxels cannot be read; the file may be truncated, copy it again") from error
-    return data.reshape(data.shape[:3]), affine
+    return data.reshape(data.shape[:3]), LPS_OF_RAS @ image.affine
 
 
 def _dicom_voxels(path: Path, side: Laterality | None, series: str) -> tuple[NDArray[np.float32], NDArray[np.float64]]:

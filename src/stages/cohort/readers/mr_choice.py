@@ -8,7 +8,7 @@ import numpy as np
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers import mr_kind
-from stages.cohort.readers.mr_stacks import FEWEST_VOXELS, MrStack
+from stages.cohort.readers.mr_stacks import FEWEST_VOXELS, SLICE_TOLERANCE, MrStack
 from stages.cohort.series import series_token
 
 _COVERS = 0.6
@@ -61,7 +61,7 @@ def choose(stacks: Sequence[MrStack], side: Laterality | None, wanted: str = "")
     _check_tie(ranked, stacks)
     left = [(stack, reason or _behind(stack, best, usable)) for stack, reason in zip(named, reasons, strict=True)]
     left += [(stack, "mr_series names another") for stack in stacks if not any(stack is one for one in named)]
-    notes = _notes(best, usable, by_name=bool(wanted))
+    notes = (*_notes(best, usable, by_name=bool(wanted)), *_torn_off(best, stacks))
     return MrChoice(best, _text(best, stacks), _merged([(s, r) for s, r in left if s is not best], stacks), notes)
 
 
@@ -196,6 +196,25 @@ def _notes(best: MrStack, usable: Sequence[MrStack], *, by_name: bool) -> tuple[
     if best.copies:
         notes.append(f"{best.copies} slices of the MR series are there twice; one of each is used")
     return tuple(notes)
+
+
+def _torn_off(best: MrStack, stacks: Sequence[MrStack]) -> list[str]:
+    """Single pictures that would be the next slice at either end: perhaps slices whose header is damaged."""
+    distance = float(np.linalg.norm(best.step))
+    ends = [best.first.position - best.step, best.frames[-1].position + best.step]
+    lone = [frame for stack in stacks if len(stack.frames) < FEWEST_VOXELS for frame in stack.frames]
+    size = (best.first.rows, best.first.columns)
+    next_ones = [
+        frame
+        for frame in lone
+        if (frame.rows, frame.columns) == size
+        and min(np.abs(frame.position - end).max() for end in ends) < SLICE_TOLERANCE * distance
+    ]
+    if not next_ones:
+        return []
+    return [
+        f"{len(next_ones)} single pictures would continue the MR series, but their headers say that they are of others"
+    ]
 
 
 def _text(stack: MrStack, stacks: Sequence[MrStack]) -> str:

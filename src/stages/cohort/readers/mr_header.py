@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +13,14 @@ from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers.dicom_headers import read_dicom
 from stages.cohort.readers.mr_folder import choose_mr
 from stages.cohort.readers.mr_stacks import FEWEST_VOXELS
+from stages.cohort.readers.nifti_header import nifti_affine
 
 NIFTI = (".nii", ".nii.gz")
 SPACING_MM = (0.1, 15.0)
 LONGEST_MM = 1500.0
+FARTHEST_MM = 3000.0
 MOST_VOXELS = 1_000_000_000
 _SAME_PLACE_MM = 0.1
-_SAME_SPACING = 0.02
 _FLAT = 0.2
 
 
@@ -93,49 +93,7 @@ def read_mr_grid(path: Path, side: Laterality | None = None, series: str = "") -
         return _checked(path, stack.shape, stack.affine)
     if not is_nifti(path):
         raise DataError(f"{path}: is neither NIfTI nor DICOM; give .nii, .nii.gz or the folder of an MR series")
-    return _checked(path, *_nifti_affine(path))
-
-
-def _nifti_affine(path: Path) -> tuple[tuple[int, ...], NDArray[np.float64]]:
-    import nibabel
-    from nibabel.imageglobals import LoggingOutputSuppressor
-
-    try:
-        with LoggingOutputSuppressor():
-            image: Any = nibabel.load(path)
-            stored = _stored_header(path, type(image.header))
-        shape, affine, kind = image.shape, image.affine, image.get_data_dtype()
-        zooms = np.asarray(stored["pixdim"][1:4], dtype=float)
-        placed = int(stored["sform_code"]) != 0 or int(stored["qform_code"]) != 0
-    except Exception as error:  # nibabel has exceptions of its own for each part of a header
-        raise DataError(f"{path}: cannot be read as NIfTI; export the volume again") from error
-    if kind.kind not in "biuf":
-        raise DataError(f"{path}: holds {kind} voxels, not grey values; export the magnitude volume")
-    if not np.all(zooms > 0):
-        listed = " x ".join(f"{z:g}" for z in zooms)
-        raise DataError(f"{path}: the header's voxel spacing is {listed} mm; correct it or export the volume again")
-    if not placed:
-        raise DataError(f"{path}: the header gives no orientation (sform and qform are unset); export again")
-    _check_spacing(path, zooms, np.linalg.norm(affine[:3, :3], axis=0))
-    shape = shape[:3] if all(n == 1 for n in shape[3:]) else shape
-    return shape, np.diag([-1.0, -1.0, 1.0, 1.0]) @ affine
-
-
-def _stored_header(path: Path, header: Any) -> Any:
-    """The header as the file has it: on loading nibabel takes a spacing of 1 for 0."""
-    from nibabel.openers import ImageOpener
-
-    with ImageOpener(path) as file:
-        return header.from_fileobj(file, check=False)
-
-
-def _check_spacing(path: Path, zooms: NDArray[np.float64], spacing: NDArray[np.float64]) -> None:
-    """Refuse a header that gives two sizes of a voxel."""
-    if np.isfinite(spacing).all() and np.abs(zooms - spacing).max() > _SAME_SPACING * spacing.min():
-        two = " and ".join(" x ".join(f"{s:.4g}" for s in sizes) for sizes in (zooms, spacing))
-        raise DataError(
-            f"{path}: pixdim and the affine give two voxel spacings, {two} mm; correct the header or export again"
-        )
+    return _checked(path, *nifti_affine(path))
 
 
 def _checked(path: Path, shape: tuple[int, ...], affine: NDArray[np.float64]) -> MrGrid:
@@ -157,4 +115,8 @@ def _checked(path: Path, shape: tuple[int, ...], affine: NDArray[np.float64]) ->
     if abs(np.linalg.det(affine[:3, :3])) < _FLAT * np.prod(spacing):
         raise DataError(f"{path}: the header's axes do not span a volume; export the volume again")
     ends = np.array(list(product(*[(0, n - 1) for n in shape])), dtype=float)
-    return MrGrid(shape, tuple(spacing), ends @ affine[:3, :3].T + affine[:3, 3])
+    corners = ends @ affine[:3, :3].T + affine[:3, 3]
+    if np.abs(corners).max() > FARTHEST_MM:
+        what = f"the header puts the volume {np.abs(corners).max():.3g} mm from the scanner's centre"
+        raise DataError(f"{path}: {what}; correct it or export the volume again")
+    return MrGrid(shape, tuple(spacing), corners)

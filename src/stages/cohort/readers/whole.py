@@ -4,13 +4,16 @@ import gzip
 import math
 import zlib
 from pathlib import Path
-from typing import Any
+
+from pydicom.dataset import Dataset
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
+from stages.cohort.readers.dicom_headers import read_dicom
 from stages.cohort.readers.mr_folder import choose_mr
 from stages.cohort.readers.mr_header import is_mr_dicom, is_nifti
 from stages.cohort.readers.mr_voxels import stored_frames
+from stages.cohort.readers.nifti_header import load_nifti
 
 _CHUNK = 1 << 22
 
@@ -31,9 +34,7 @@ def check_whole_mr(path: Path, side: Laterality | None = None, series: str = "")
 
 
 def _check_whole_nifti(path: Path) -> None:
-    import nibabel
-
-    image: Any = nibabel.load(path)
+    image = load_nifti(path)
     promised = int(image.dataobj.offset) + math.prod(image.shape) * image.header.get_data_dtype().itemsize
     try:
         found = _unpacked_size(path) if path.name.lower().endswith(".gz") else path.stat().st_size
@@ -58,32 +59,29 @@ def check_whole_dicom(path: Path) -> None:
     Raises:
         DataError: pixels are missing.
     """
-    from pydicom import dcmread
-    from pydicom.errors import InvalidDicomError
-
+    damaged = f"{path}: ends early or is damaged; copy or export it again"
     try:
-        data = dcmread(path)
-        promised, pixels = _promised_bytes(data), data.get("PixelData")
-    except InvalidDicomError:
+        data = read_dicom(path, pixels=True)
+    except DataError as error:
+        raise DataError(damaged) from error
+    if data is None or "Rows" not in data or "BitsAllocated" not in data:
         return
-    except Exception as error:  # pydicom raises many kinds for damaged bytes, some when a value is looked at
-        raise DataError(f"{path}: ends early or is damaged; copy or export it again") from error
-    if promised is None:
-        return
+    try:
+        pixels, promised = data.get("PixelData"), _promised_bytes(data)
+    except Exception as error:  # sizes that are no numbers, a transfer syntax that is none
+        raise DataError(damaged) from error
     if not pixels:
         raise DataError(f"{path}: holds no pixels; copy or export it again")
-    if len(pixels) < promised:
+    if promised is not None and len(pixels) < promised:
         raise DataError(f"{path}: holds {len(pixels)} of the {promised} bytes of its pixels; copy or export it again")
 
 
-def _promised_bytes(data: Any) -> int | None:
-    """Bytes of the pixels by the header: 0 where compression hides them, None where there is no image."""
-    if "Rows" not in data or "BitsAllocated" not in data:
+def _promised_bytes(header: Dataset) -> int | None:
+    """Bytes of the pixels by the header; None where they are compressed, and known only once they are decoded."""
+    if header.file_meta.TransferSyntaxUID.is_compressed:
         return None
-    if data.file_meta.TransferSyntaxUID.is_compressed:
-        return 0
-    samples = int(data.get("SamplesPerPixel") or 1) * int(data.get("NumberOfFrames") or 1)
-    return int(data.Rows) * int(data.Columns) * samples * int(data.BitsAllocated) // 8
+    samples = int(header.get("SamplesPerPixel") or 1) * int(header.get("NumberOfFrames") or 1)
+    return int(header.Rows) * int(header.Columns) * samples * int(header.BitsAllocated) // 8
 
 
 def check_whole_picture(path: Path) -> None:
