@@ -95,6 +95,7 @@ def write_pose(
     flips: tuple[bool, bool],
     outlined: bool,
     flags: Sequence[str] = (),
+    values: dict[str, Any] | None = None,
 ) -> Path:
     found = PoseFields(
         view=geometry(view),
@@ -105,6 +106,7 @@ def write_pose(
         drawn_mm=(0.0, 0.0, 0.0),
         estimated=("source_detector_mm",),
         flags=flags,
+        values=values or {},
     )
     write_artefact(path, header("pose", laterality, view), found.fields())
     return path

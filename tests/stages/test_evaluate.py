@@ -150,6 +150,18 @@ def test_what_speaks_against_a_breast_between_plates(tmp_path: Path, values: dic
     assert rows_of(found, "view_rows", "rigid")[0]["trust"].find("plate") < 0
 
 
+def test_views_that_are_all_of_another_size_are_flagged_together(tmp_path: Path) -> None:
+    """One view alone may be off by as much."""
+    inputs = synthetic.write_case(tmp_path)
+    for size, doubted in ((1.03, False), (1.15, True)):
+        for view, path in zip(("CC", "MLO"), inputs["pose"], strict=True):
+            values = {"relative_size": size if view == "MLO" else 1.06}
+            synthetic.write_pose(path, "R", view, (False, False), True, values=values)
+        rows = evaluated(tmp_path, inputs).value("view_rows")
+        text = "all mammograms show a breast 9% smaller than the MR volume's: check their pixel spacing and thickness"
+        assert {(text in row["trust"]) for row in rows} == {doubted}
+
+
 def test_elongation_is_the_closed_form(tmp_path: Path) -> None:
     inputs = synthetic.write_case(tmp_path, views=("3D",), compressed=True)
     stretch = synthetic.SHRINK**-0.5 - 1.0

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import SimpleITK
 from PIL import Image
 
 from mammoreg.geometry import breast_to_lps, plate_to_breast
@@ -148,6 +149,30 @@ def test_directions_do_not_read_each_others_marks(both_ways: Artefact, tmp_path:
     assert only_mr.value("mr_rows") == []
     assert only_views.value("mr_rows") == both_ways.value("mr_rows")
     assert only_views.value("mammogram_rows") == only_views.value("compressed_rows") == []
+
+
+def test_marks_of_3d_slicer_are_those_of_the_tables(both_ways: Artefact, tmp_path: Path) -> None:
+    """Landmarks in RAS, and the lesion as a cropped segment on a grid of its own."""
+    columns = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
+    lines = ["# Markups fiducial file version = 5.6", "# CoordinateSystem = RAS", f"# columns = {columns}"]
+    lines += [f"1,{-p[0]},{-p[1]},{p[2]},0,0,0,1,1,1,0,{name},," for name, p in POINTS.items()]
+    (tmp_path / "F.fcsv").write_text("\n".join(lines) + "\n")
+    axis = np.arange(-12, 13) * 0.5
+    ball = np.linalg.norm(np.meshgrid(axis, axis, axis, indexing="ij"), axis=0) <= 5.0
+    image = SimpleITK.GetImageFromArray(ball.astype(np.uint8))
+    image.SetSpacing([0.5] * 3)
+    image.SetOrigin((LESION - 6.0).tolist())
+    for key, value in (("ID", "s"), ("Name", "mass"), ("LabelValue", "1"), ("Layer", "0")):
+        image.SetMetaData(f"Segment0_{key}", value)
+    SimpleITK.WriteImage(image, str(tmp_path / "mass.seg.nrrd"))
+    marks = {"mr_lesion": tmp_path / "mass.seg.nrrd", "mr_landmarks": tmp_path / "F.fcsv"}
+    found = localized(synthetic.write_case(tmp_path) | marks, tmp_path / "localize.h5")
+    expected = {(r["view"], r["name"]): r for r in rows_of(both_ways, "mammogram_rows")}
+    for row in rows_of(found, "mammogram_rows"):
+        other = expected[row["view"], "mass" if row["name"] == "lesion" else row["name"]]
+        assert row["seen"] == other["seen"]
+        if row["seen"]:
+            np.testing.assert_allclose([row["column"], row["row"]], [other["column"], other["row"]], atol=0.2)
 
 
 def _marked_at(folder: Path, lps: np.ndarray, diameter_mm: float = 10.0) -> dict[str, Path]:

@@ -180,6 +180,20 @@ def test_case_with_nothing_to_go_by_fails(tmp_path):
     assert (got.status, "neither a mammogram" in got.message) == ("failed", True)
 
 
+def test_the_size_of_image_and_model_is_compared(found):
+    assert found.value("relative_size") == pytest.approx(1.0, abs=0.03)
+    assert found.value("imaged_ml") > 0.0
+    assert not any("size" in flag or "smaller" in flag or "larger" in flag for flag in found.value("flags"))
+
+
+def test_a_pixel_spacing_that_cannot_be_fails_with_numbers(inputs, tmp_path):
+    row = ROW | {"pixel_spacing_mm": str(0.3 * float(ROW["pixel_spacing_mm"]))}
+    got = run("pose", tmp_path, inputs, row=row)
+    assert got.status == "failed"
+    assert "the mammogram shows" in got.message
+    assert "they are not of one size; check pixel spacing, thickness, magnification" in got.message
+
+
 def test_nothing_converges(inputs, tmp_path, monkeypatch):
     def never(self, gap_mm):
         raise NotConvergedError("no")
