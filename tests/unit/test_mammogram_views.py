@@ -15,7 +15,8 @@ def test_the_muscle_is_found_where_superior_lies_in_each_view(view):
     found = analyse(image if superior_first else image[::-1], PIXEL_MM, view).pectoral
     assert expected is not None
     assert found is not None
-    assert np.array_equal(found if superior_first else found[::-1], expected)
+    found = found if superior_first else found[::-1]
+    assert np.count_nonzero(found ^ expected) < 0.01 * np.count_nonzero(expected)
 
 
 @pytest.mark.parametrize("view", ["CC", "XCCL", "XCCM", "FB"])
