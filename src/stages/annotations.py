@@ -1,6 +1,6 @@
 """What users mark, as numerics see it: in the MR volume in LPS, in a mammogram in canonical pixels.
 
-A canonical image has the chest wall at column 0 and its rows run towards medial.
+A canonical image has the chest wall at column 0 and its rows run along the plate frame's first axis.
 """
 
 import numpy as np

@@ -12,9 +12,9 @@ Three frames are used, all in mm:
 A point source stands above the chest-wall edge of the detector, in its middle row; the detector lies on the lower
 plate's far side. From the breast the source lies along (-s sin a, 0, cos a) in LPS, a the projection angle: positive a
 turns it towards the middle of the body. CC: a small signed roll, 0 in headers; MLO: the absolute value of the header's
-angle. In an image as usually stored, rows of pixels run between chest wall and nipple and follow each other along
-(-s cos a, 0, -sin a), which is towards medial. Plates end at the detector's chest-wall edge; the image shows only
-what lies in front of it.
+angle; those of the other views stand in `mammoreg.imaging.views`. In an image as usually stored, rows of pixels run
+between chest wall and nipple and follow each other along (-s cos a, 0, -sin a), which is towards medial in CC and MLO.
+Plates end at the detector's chest-wall edge; the image shows only what lies in front of it.
 """
 
 from mammoreg.geometry.affine import volume_of_affine

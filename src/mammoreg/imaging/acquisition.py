@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry
-from mammoreg.imaging.views import PROJECTIONS, View
+from mammoreg.imaging.views import PROJECTIONS, View, view_named
 
 DEFAULT_SOURCE_DETECTOR_MM = 650.0
 DEFAULT_SUPPORT_DETECTOR_MM = 15.0
@@ -48,8 +48,7 @@ class Mammogram:
     def __post_init__(self) -> None:
         if np.ndim(self.pixels) != 2:
             raise DataError(f"a mammogram is an array of rows and columns, not of shape {np.shape(self.pixels)}")
-        if self.view not in PROJECTIONS:
-            raise DataError(f"view {self.view!r} is not known; it is one of {', '.join(PROJECTIONS)}")
+        view_named(self.view)
         for name in ("pixel_mm", "thickness_mm"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < np.inf:

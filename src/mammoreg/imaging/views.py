@@ -6,6 +6,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from mammoreg.errors import DataError
+
 View = Literal["CC", "MLO", "ML", "LM", "LMO", "XCCL", "XCCM", "FB"]
 """ACR names: from the source's side to the detector's, exaggerated to lateral or medial, from below."""
 VIEWS: tuple[View, ...] = get_args(View)
@@ -58,6 +60,18 @@ PROJECTIONS: Mapping[View, Projection] = {
     "XCCM": Projection("cranio-caudal exaggerated medially", 0.0, -30.0, 30.0),
     "FB": Projection("caudo-cranial (from below)", 180.0, 150.0, 210.0),
 }
+
+
+def view_named(name: str | None) -> View:
+    """The view of a name.
+
+    Raises:
+        DataError: there is none.
+    """
+    for view in VIEWS:
+        if view == name:
+            return view
+    raise DataError(f"view {name!r} is not known; it is one of {', '.join(VIEWS)}")
 
 
 def projection_of(view: str) -> Projection:

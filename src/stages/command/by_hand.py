@@ -42,7 +42,7 @@ def add_stage(commands: Any, name: str, program: str) -> None:
     parser.add_argument("stage", help="name of the stage")
     parser.add_argument("--case", default="cohort", help="id of the case (default: cohort, a stage that has none)")
     parser.add_argument("--laterality", choices=("L", "R"), default="R", help="side of the breast")
-    parser.add_argument("--view", help="the view, for a stage that runs once per view: CC, MLO, or 3D")
+    parser.add_argument("--view", help="the view, for a stage that runs once per view: CC, MLO, ..., or 3D")
     parser.add_argument(
         "--row", action="append", default=[], metavar="COLUMN=VALUE", help="a value of the tables; may be repeated"
     )

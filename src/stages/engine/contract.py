@@ -68,7 +68,7 @@ class Subject:
     Attributes:
         case: id of the case, or "cohort" for a stage that runs once for all.
         laterality: side of the breast (of a cohort's stage: without meaning).
-        view: CC, MLO or 3D for a stage that runs once per view.
+        view: a mammogram's view (CC, MLO, ML, ...) or 3D for a stage that runs once per view.
         row: the tables' columns that are values, not files, such as `thickness_mm`; empty cells are left out.
     """
 

@@ -11,7 +11,7 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.acquisition import Mammogram
 from mammoreg.imaging.mammogram import MammogramAnalysis
-from mammoreg.imaging.views import VIEWS, View
+from mammoreg.imaging.views import View, view_named
 from mammoreg.pose.outlined import OUTLINE_RAYS, OutlinedMammogram, OutlinedView, outlined_mammograms
 from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
@@ -78,7 +78,7 @@ def facts_of_mammogram(path: Path, subject: Subject) -> tuple[tuple[ViewFacts, .
 
 def view_of(subject: Subject) -> View:
     """The mammogram's view of a stage's subject."""
-    return next(name for name in VIEWS if name == subject.view)
+    return view_named(subject.view)
 
 
 def _facts(outlined: OutlinedMammogram, facts: MammogramFacts) -> ViewFacts:

@@ -42,7 +42,7 @@ _SEEN = "predicted_mammogram_seen"
 def cohort_netcdf(rows_of: Mapping[str, Sequence[Row]], outcomes: Mapping[str, tuple[str, str]]) -> bytes:
     """The numbers of all tables as a netCDF-4 file; tables without rows leave none.
 
-    Dimensions are `case`, `view` (CC, MLO, 3D, and CC+MLO where both are used together), `approach` (the tables'
+    Dimensions are `case`, `view` (CC, MLO, ..., 3D, and CC+MLO where both are used together), `approach` (the tables'
     `method`), `mark` (lesions and landmarks), `direction` and `check`. Texts stand in the tables.
 
     Args:
