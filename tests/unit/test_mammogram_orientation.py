@@ -212,8 +212,7 @@ def test_how_views_are_hung(view, upright, as_canonical):
     assert (PROJECTIONS[view].upright, PROJECTIONS[view].hung_as_canonical) == (upright, as_canonical)
 
 
-@pytest.mark.parametrize("view", ["LM", "LMO", "FB"])
-def test_views_that_are_stored_either_way_need_their_orientation(view):
-    with pytest.raises(DataError, match=f"orientation of a {view} view is unknown.*give the column 'orientation'"):
-        canonicalise(breast_image(), "L", view)
-    assert not canonicalise(breast_image(), "L", "ML").flips.rows
+@pytest.mark.parametrize(("view", "flipped"), [("CC", False), ("ML", False), ("LM", True), ("LMO", True), ("FB", True)])
+def test_without_orientation_the_first_row_is_the_one_that_is_hung_on_top(view, flipped):
+    assert canonicalise(breast_image(), "L", view).flips.rows == flipped
+    assert canonicalise(breast_image(), "L", view, turned=True).flips.rows != flipped

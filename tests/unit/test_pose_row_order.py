@@ -49,3 +49,11 @@ def test_two_orders_that_fit_alike_are_as_usual_with_a_doubt_where_the_chest_wal
 def test_a_breast_that_fits_in_neither_order_fails_as_in_the_usual_one():
     with pytest.raises(DataError, match="first"):
         pose_in_order([_order(False, DataError("first")), _order(True, DataError("second"))], _find, "R", "CC")
+
+
+@pytest.mark.parametrize(("view", "usual", "other"), [("LM", r"P\F", r"P\H"), ("FB", r"P\L", r"P\R")])
+def test_a_view_that_is_stored_either_way_is_asked_for_where_nothing_decides(view, usual, other):
+    with pytest.raises(DataError, match=f"a {view} is stored either way") as caught:
+        pose_in_order([_order(True, 1.0), _order(False, 0.0)], _find, "R", view)
+    assert f"with {usual} or {other}" in str(caught.value)
+    assert pose_in_order([_order(True, 9.0), _order(False, 0.0)], _find, "R", view).chosen == 1

@@ -10,8 +10,8 @@ from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mammogram_air import Air, find_air
 from mammoreg.imaging.mammogram_frame import without_frame
-from mammoreg.imaging.mammogram_orientation import Flips, check_usual, flips_of_orientation
-from mammoreg.imaging.views import View
+from mammoreg.imaging.mammogram_orientation import Flips, flips_of_orientation
+from mammoreg.imaging.views import PROJECTIONS, View
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,13 @@ def canonicalise(
     Args:
         stored: pixels as stored, (rows, columns).
         orientation: PatientOrientation, or None: then the image's air tells the chest-wall side, and rows are taken to
-            run as usually stored, lateral or superior first; LM, LMO and FB need it.
+            run as usually stored, as a unit hangs them: superior, or of a flat view lateral, first.
         photometric: PhotometricInterpretation, or None: then the air at the border decides.
         linear: True where grey values are proportional to exposure (unprocessed data), which takes a logarithm.
         turned: without an orientation, take rows to run the other way.
 
     Raises:
-        DataError: If no breast is seen, the orientation must be known and is not, or the image contradicts it or its
-            polarity.
+        DataError: If no breast is seen, or the image contradicts its orientation or its polarity.
     """
     framed = without_frame(stored)
     air = find_air(framed)
@@ -68,8 +67,7 @@ def canonicalise(
 
 def _flips(air: Air, orientation: str | None, laterality: Laterality, view: View, turned: bool) -> Flips:
     if orientation is None:
-        check_usual(view)
-        return Flips(rows=turned, columns=air.side == "left")
+        return Flips(rows=turned == PROJECTIONS[view].hung_as_canonical, columns=air.side == "left")
     flips = flips_of_orientation(orientation, laterality, view)
     if flips.chest_wall_side == air.side:
         raise DataError(

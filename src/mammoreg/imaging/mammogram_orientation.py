@@ -45,19 +45,6 @@ class Flips:
         return "right" if self.columns else "left"
 
 
-def check_usual(view: View) -> None:
-    """Whether an image of a view without orientation may be taken as usually stored, the first row hung on top.
-
-    Raises:
-        DataError: the canonical image of this view stands on its head, so that units store it one way or the other.
-    """
-    if not PROJECTIONS[view].hung_as_canonical:
-        raise DataError(
-            f"the orientation of a {view} view is unknown, and such images are stored either way; give the column "
-            r"'orientation', such as 'A\F' for a left LM with superior on top"
-        )
-
-
 def flips_of_orientation(orientation: str, laterality: Laterality, view: View) -> Flips:
     r"""Decide the flips from PatientOrientation, side and view.
 

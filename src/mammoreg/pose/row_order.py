@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from mammoreg.errors import DataError, NotConvergedError
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mammogram_orientation import orientation_of_flips
-from mammoreg.imaging.views import View
+from mammoreg.imaging.views import PROJECTIONS, View
 from mammoreg.pose.outlined import OutlinedMammogram, OutlinedView
 from mammoreg.pose.search import FoundPose
 
@@ -43,8 +43,9 @@ def pose_in_order(
         find: seeks the pose of a view.
 
     Raises:
-        DataError: the misfits do not decide, and the chest wall lies at the edge at which it is not usually stored, so
-            that the picture is mirrored or turned; or whatever `find` raises of the usual order.
+        DataError: the misfits do not decide, and the view is stored either way, or the chest wall lies at the edge at
+            which it is not usually stored, so that the picture is mirrored or turned; or whatever `find` raises of the
+            usual order.
     """
     if len(orders) == 1:
         return OrderedPose(0, find(orders[0].view))
@@ -54,7 +55,7 @@ def pose_in_order(
     found = tried[chosen]
     decided = abs(usual - turned) >= DECISIVE if min(usual, turned) < float("inf") else True
     if not decided:
-        if not _usual_side(orders[0], laterality):
+        if not (_usual_side(orders[0], laterality) and PROJECTIONS[view].hung_as_canonical):
             raise DataError(_asked_for(orders, laterality, view))
         chosen, found = 0, tried[0]
     if isinstance(found, Exception):
@@ -89,6 +90,11 @@ def _usual_side(order: OutlinedMammogram, laterality: Laterality) -> bool:
 def _asked_for(orders: Sequence[OutlinedMammogram], laterality: Laterality, view: View) -> str:
     mirrored, turned = (orientation_of_flips(order.image.flips, laterality, view) for order in orders)
     side = orders[0].image.flips.chest_wall_side
+    if _usual_side(orders[0], laterality):
+        return (
+            f"the picture does not tell which way its rows run, and a {view} is stored either way; fill the column "
+            f"'orientation' in the views table, with {mirrored} or {turned}"
+        )
     return (
         f"the picture does not tell which way its rows run: its chest wall lies at the {side} edge, so that it is "
         f"mirrored or turned by 180 degrees; fill the column 'orientation' in the views table, with {mirrored} if it "

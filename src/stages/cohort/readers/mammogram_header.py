@@ -8,7 +8,7 @@ from pydicom.dataset import Dataset
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-from mammoreg.imaging.mammogram_orientation import check_usual, flips_of_orientation
+from mammoreg.imaging.mammogram_orientation import flips_of_orientation
 from mammoreg.imaging.views import PROJECTIONS, View
 from stages.cohort.readers.header_values import text, texts
 from stages.cohort.readers.mammogram_numbers import Numbers
@@ -76,7 +76,8 @@ def mammogram_facts(
         "support_detector_mm": numbers.support_detector_mm(),
     }
     orientation = row.get("orientation", "").strip() or _orientation(header)
-    _check_orientation(path, orientation, laterality, view)
+    if orientation:
+        _check_orientation(path, orientation, laterality, view)
     photometric, intent = text(header, "PhotometricInterpretation"), text(header, "PresentationIntentType")
     named = {**known, "orientation": orientation, "polarity": photometric}
     estimated = tuple(name for name, value in named.items() if value is None)
@@ -129,12 +130,9 @@ def _contradictions(said: Iterable[Said], wanted: str, column: str, remedy: str)
     ]
 
 
-def _check_orientation(path: Path, orientation: str | None, laterality: Laterality, view: View) -> None:
+def _check_orientation(path: Path, orientation: str, laterality: Laterality, view: View) -> None:
     try:
-        if orientation:
-            flips_of_orientation(orientation, laterality, view)
-        else:
-            check_usual(view)
+        flips_of_orientation(orientation, laterality, view)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
 
