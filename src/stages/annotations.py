@@ -16,11 +16,15 @@ from mammoreg.localization.lesions import (
     area_from_disc,
     area_from_mask,
 )
+from mammoreg.localization.outside import distance_outside_px
 from mammoreg.metrics.distances import breast_scale_mm
 from stages.cohort.readers.masks import mask_names, read_image_mask, read_masks
 from stages.cohort.readers.points import MASK_NAME, is_list, read_discs, read_pixels, read_points, read_spheres
 from stages.engine.contract import Inputs
 from stages.pose.record import PoseRecord
+
+IMAGE_AIR_MM = 3.0
+"""Marks in a mammogram's air this far from the breast are flagged; those of sound cases lie in the breast."""
 
 
 def mr_landmarks(inputs: Inputs, name: str = "mr_landmarks") -> dict[str, Points]:
@@ -79,3 +83,12 @@ def view_areas(inputs: Inputs, pose: PoseRecord) -> dict[str, LesionArea]:
         column, row = pose.canonical_pixels(pixel)
         found[name] = area_from_disc(float(column), float(row), diameter_mm * per_mm)
     return found
+
+
+def landmarks_in_air(inputs: Inputs, pose: PoseRecord) -> list[str]:
+    """Names of a mammogram's landmarks that lie in its air."""
+    if not pose.has_mammogram:
+        return []
+    breast, limit_px = pose.tissue != 0, IMAGE_AIR_MM / breast_scale_mm(pose.geometry)
+    places = {name: pose.canonical_pixels(pixel) for name, pixel in view_landmarks(inputs, pose.view).items()}
+    return [name for name, pixel in places.items() if distance_outside_px(pixel, breast) > limit_px]

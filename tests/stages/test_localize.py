@@ -13,8 +13,9 @@ from mammoreg.geometry import breast_to_lps, plate_to_breast
 from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.lesions import LesionArea, area_from_disc
 from mammoreg.metrics.distances import breast_scale_mm
+from stages.annotations import landmarks_in_air
 from stages.engine.artefact import Artefact, Fields, write_artefact
-from stages.engine.contract import Subject
+from stages.engine.contract import Inputs, Subject
 from stages.engine.run import run_stage
 from stages.localize.strays import strays_in_mammogram
 from stages.methods import METHODS
@@ -250,6 +251,17 @@ def test_lesions_marked_in_the_air_of_a_mammogram() -> None:
     assert "turned by 180 degrees" not in found["below"].message
     assert "turned upside down it lies inside" not in found["below"].message
     assert "fills the breast (88% of it)" in found["all"].message
+
+
+def test_landmarks_in_the_air_of_a_mammogram(tmp_path: Path) -> None:
+    tissue = np.zeros((200, 100), np.uint8)
+    tissue[20:150, :40] = 1
+    pose: Any = SimpleNamespace(
+        tissue=tissue, geometry=synthetic.geometry("CC"), view="CC", has_mammogram=True, canonical_pixels=np.asarray
+    )
+    rows = {"in": [20, 60], "at the skin": [41, 60], "air": [80, 60], "off": [20, 230]}
+    inputs = Inputs({"landmarks_CC": write_tsv(tmp_path / "p.tsv", "name column row", rows)})
+    assert landmarks_in_air(inputs, pose) == ["air", "off"]
 
 
 def write_mask(path: Path, size: tuple[int, int], flips: tuple[bool, bool] = (False, False)) -> Path:

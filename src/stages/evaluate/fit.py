@@ -57,7 +57,7 @@ def fit_rows(
     Args:
         results: artefacts of `compress`, `solve` and `project`.
         beam_gaps: largest gap of the beams to a lesion, by method.
-        of_case: what speaks against all views of the case.
+        of_case: what speaks against the case or the view besides.
     """
     outline, view = pose.outline(FINE_RAYS) if pose.has_outline else None, pose.view
     projected, pressed = (of_view(results, stage, view) for stage in ("project", "compress"))

@@ -5,7 +5,15 @@ from dataclasses import replace
 
 from pydantic import Field
 
-from stages.annotations import mr_landmarks, mr_lesion_names, mr_lesions, view_areas, view_landmarks, view_lesion_names
+from stages.annotations import (
+    landmarks_in_air,
+    mr_landmarks,
+    mr_lesion_names,
+    mr_lesions,
+    view_areas,
+    view_landmarks,
+    view_lesion_names,
+)
 from stages.elongation import elongation_rows
 from stages.engine.artefact import Fields
 from stages.engine.completion import first_failure
@@ -134,14 +142,21 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
     of_case = size_doubts([pose.relative_size for pose in poses])
     for pose in sorted(poses, key=lambda pose: view_order(pose.view)):
         methods = method_views(pose, mesh.reference, results)
-        fits += fit_rows(pose, mesh.block, methods, results, gaps, limits, of_case)
+        doubts = [*of_case, *_landmark_doubts(inputs, pose)]
+        fits += fit_rows(pose, mesh.block, methods, results, gaps, limits, doubts)
         elongations += elongation_rows(pose, mesh.block, methods)
-    doubts = SegmentRecord(inputs.artefact("segment")).doubts
+    of_volume = SegmentRecord(inputs.artefact("segment")).doubts
     for row in fits:
-        row["trust"] = "; ".join(filter(None, [row["trust"], *doubts]))
+        row["trust"] = "; ".join(filter(None, [row["trust"], *of_volume]))
     for row in (row for row in fits if row["trust"]):
         print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
     return fits, elongations
+
+
+def _landmark_doubts(inputs: Inputs, pose: PoseRecord) -> list[str]:
+    """What speaks against a view's own landmarks, with which its predictions are compared."""
+    names = landmarks_in_air(inputs, pose)
+    return [f"{len(names)} landmarks marked in the air: check column and row, and the outline"] if names else []
 
 
 STAGE = Stage(

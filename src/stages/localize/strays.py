@@ -17,6 +17,7 @@ from mammoreg.geometry.frames import Laterality
 from mammoreg.localization.lesions import LesionArea
 from mammoreg.localization.outside import distance_outside_mm, distance_outside_px
 from mammoreg.metrics.distances import breast_scale_mm
+from stages.annotations import IMAGE_AIR_MM
 from stages.localize.record import FILLING, STRAY
 from stages.pose.record import PoseRecord
 
@@ -27,8 +28,6 @@ REFUSED_MM = 45.0
 """Marks this far outside are refused: an eighth of a metre of breast cannot be missing."""
 IN_AIR_MM = 5.0
 """Marks in the air this far from the breast are flagged; those on the skin lie within 2 mm."""
-IMAGE_AIR_MM = 3.0
-"""Marks in a mammogram's air this far from the breast are flagged."""
 IMAGE_REFUSED_MM = 15.0
 """Marks in a mammogram's air this far from the breast are refused; no outline is that far off where it is found."""
 FILLS = 0.5
