@@ -18,8 +18,8 @@ IMPOSSIBLE_SHARE = (0.2, 3.0)
 """Imaged volume over the MR breast's beyond which a view fails."""
 ODD_SHARE = (0.4, 2.0)
 """The same, beyond which a view is flagged; views of known size have 0.63 to 1.45, where the model is cut off 1.9."""
-ODD_SIZE = (0.8, 1.14)
-"""Relative size beyond which a view is flagged; views of known size have 0.84 to 1.10."""
+ODD_SIZE = (0.75, 1.14)
+"""Relative size beyond which a view is flagged; views of known size have 0.81 to 1.10."""
 IMPOSSIBLE_SIZE = (0.65, 1.5)
 """Relative size beyond which a view fails."""
 
