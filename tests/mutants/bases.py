@@ -1,5 +1,6 @@
 """The unmutated cases, in every form in which users hand them in, written as files with their two tables."""
 
+import csv
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -21,7 +22,7 @@ from mammoreg.phantom.warp import Deformed
 from stages.digital import stage as digital
 from stages.digital.stage import DigitalPatient, Settings
 from stages.engine.contract import Inputs, Subject
-from tests.mutants.case_folder import NAME, CaseFolder, edit_dicom, read_picture, write_table
+from tests.mutants.case_folder import NAME, CaseFolder, edit_dicom, nifti_of, read_picture, write_table
 from tests.shared_data import DATA
 
 _GRIDS = {
@@ -128,17 +129,16 @@ def _as_picture(case: CaseFolder, view: str, row: dict[str, str]) -> None:
 
 
 def _marks_as_tables(case: CaseFolder) -> None:
-    from stages.cohort.readers.points import read_image_mask, read_mask
-
-    volume = read_mask(case.path("mr_lesion"))
-    centre = volume.centres(np.asarray(volume.data, bool)).mean(axis=0)
-    diameter = 2.0 * (3.0 * volume.data.sum() * volume.voxel_mm3 / (4.0 * np.pi)) ** (1 / 3)
-    line = ["lesion", *(f"{x:.2f}" for x in centre), f"{diameter:.1f}"]
+    """Centres and diameters of the masks, as a reader would write them down."""
+    _, image, mask = nifti_of(case, "mr_lesion")
+    x, y, z, _ = image.affine @ [*ndimage.center_of_mass(mask), 1.0]
+    diameter = 2.0 * (3.0 * mask.sum() * abs(np.linalg.det(image.affine[:3, :3])) / (4.0 * np.pi)) ** (1 / 3)
+    line = ["lesion", f"{-x:.2f}", f"{-y:.2f}", f"{z:.2f}", f"{diameter:.1f}"]
     write_table(case.rename("mr_lesion", None, "mr_lesion.tsv"), [["name", "x", "y", "z", "diameter_mm"], line])
-    for view in case.views:
-        mask = read_image_mask(case.path("lesion", view))
-        row, column = ndimage.center_of_mass(mask)
-        diameter = 2.0 * np.sqrt(mask.sum() / np.pi) * float(case.views[view]["pixel_spacing_mm"])
+    for view, cells in case.views.items():
+        inside = read_picture(case.path("lesion", view)) > 0
+        row, column = ndimage.center_of_mass(inside)
+        diameter = 2.0 * np.sqrt(inside.sum() / np.pi) * float(cells["pixel_spacing_mm"])
         line = ["lesion", f"{column:.1f}", f"{row:.1f}", f"{diameter:.1f}"]
         new = case.rename("lesion", view, f"{view.lower()}_lesion.tsv")
         write_table(new, [["name", "column", "row", "diameter_mm"], line])
@@ -146,8 +146,6 @@ def _marks_as_tables(case: CaseFolder) -> None:
 
 def _write_shared(folder: Path, cohort: str, case: str, drop: tuple[str, ...] = ()) -> CaseFolder:
     """A case of a cohort beside the project, its files under short names."""
-    import csv
-
     source, rows = DATA / cohort, dict[str, list[dict[str, str]]]()
     for table in ("cases", "views"):
         with (source / f"{table}.tsv").open(encoding="utf-8", newline="") as file:
