@@ -155,3 +155,38 @@ def test_colour_picture_is_refused_and_grey_rgb_is_read(tmp_path):
     imsave(tmp_path / "colour.png", colour, check_contrast=False)
     with pytest.raises(DataError, match="colour picture"):
         read_mammogram(tmp_path / "colour.png", {}, "R", "CC")
+
+
+def _view_code(value):
+    code = Dataset()
+    code.CodeValue, code.CodingSchemeDesignator, code.CodeMeaning = value, "SCT", ""
+    return [code]
+
+
+def test_a_view_that_only_the_code_names_is_held_against_the_table(tmp_path):
+    path = _dicom(tmp_path / "a.dcm", ViewPosition=None, ViewCodeSequence=_view_code("399368009"))
+    with pytest.raises(DataError, match="the header's ViewCodeSequence is MLO, the table's view is CC"):
+        read_mammogram_facts(path, {}, "R", "CC")
+    assert read_mammogram_facts(path, {"angle_deg": "45"}, "R", "MLO").flags == ()
+
+
+@pytest.mark.parametrize(
+    "elements",
+    [{"ViewPosition": "RIGHT CC"}, {"ViewPosition": "RCC"}, {"ImageLaterality": "RIGHT"}, {"PatientOrientation": "CC"}],
+)
+def test_what_vendors_write_for_side_and_view_agrees_with_the_table(tmp_path, elements):
+    path = _dicom(tmp_path / "a.dcm", **elements)
+    assert read_mammogram_facts(path, {}, "R", "CC").flags == ()
+    with pytest.raises(DataError, match="the table's"):
+        read_mammogram_facts(path, {}, "L", "MLO")
+
+
+def test_views_that_the_model_does_not_know_are_refused_or_flagged(tmp_path):
+    path = _dicom(tmp_path / "a.dcm", ViewPosition="MCC")
+    with pytest.raises(DataError, match="is a magnification view, which cannot be registered; name a plain view"):
+        read_mammogram_facts(path, {}, "R", "CC")
+    path = _dicom(tmp_path / "b.dcm", BreastImplantPresent="YES", PartialView="YES", ViewPosition="XCCL")
+    flags = read_mammogram_facts(path, {}, "R", "XCCL").flags
+    assert flags[0].startswith("exaggerated view")
+    assert flags[1].startswith("breast implant")
+    assert flags[2].startswith("partial view")

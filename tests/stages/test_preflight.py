@@ -356,3 +356,13 @@ def test_mammogram_whose_first_bytes_are_damaged(folder, old, new):
     assert old in content
     path.write_bytes(content.replace(old, new, 1))
     _assert_only(folder, "cc.dcm: ")
+
+
+def test_what_trust_will_say_of_a_mammograms_header_is_told(folder):
+    cohort = read_cohort(folder / "cases.tsv", folder / "views.tsv")
+    assert warnings_of(cohort) == []
+    write_dicom(folder / "cc.dcm", BodyPartThickness="7.2", BreastImplantPresent="YES")
+    assert warnings_of(cohort) == [
+        "views.tsv (c1 CC), column image: breast implant, which the model does not know: do not trust",
+        "views.tsv (c1 CC), column image: BodyPartThickness 7.2 read as cm",
+    ]
