@@ -1,8 +1,11 @@
 """Plain and synthetic mammograms pass; parts of a tomosynthesis and other images are named."""
 
 import pytest
+from pydicom.dataelem import RawDataElement
 from pydicom.dataset import Dataset
+from pydicom.tag import Tag
 
+from stages.cohort.readers.header_values import texts
 from stages.cohort.readers.mammogram_kind import lift_frame_values, other_kind
 
 TOMOSYNTHESIS = "1.2.840.10008.5.1.4.1.1.13.1.3"
@@ -66,3 +69,12 @@ def test_values_of_the_frame_stand_in_for_missing_ones_and_overwrite_none():
     lift_frame_values(header)
     assert (header.PixelSpacing, header.FrameLaterality, header.PositionerPrimaryAngle) == ([0.1, 0.1], "R", 45)
     assert header.BodyPartThickness == 60
+
+
+def test_a_value_of_the_frame_that_is_no_number_is_lifted_as_it_is():
+    taken = Dataset()
+    tag = Tag("BodyPartThickness")
+    taken[tag] = RawDataElement(tag, "DS", 10, b"Anonymized", 0, False, True)
+    header = _header(XRay3DAcquisitionSequence=[taken])
+    lift_frame_values(header)
+    assert texts(header, "BodyPartThickness") == ("Anonymized",)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 
+from pydicom.datadict import dictionary_has_tag, dictionary_VR, keyword_for_tag
 from pydicom.dataset import Dataset
 from pydicom.uid import (
     BreastProjectionXRayImageStorageForPresentation,
@@ -78,13 +79,15 @@ def lift_frame_values(header: Dataset) -> None:
     for group in _frame_groups(header):
         for keyword in _OF_FRAME:
             if keyword not in header and keyword in group:
-                header.add(group[keyword])
+                # As stored: a value that is none is told by who reads it.
+                header[keyword] = group.get_item(keyword)
 
 
 def _frame_groups(header: Dataset) -> Iterator[Dataset]:
     yield from items(header, "XRay3DAcquisitionSequence")
     for keyword in ("SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence"):
         for group in items(header, keyword)[:1]:
-            for element in group:
-                if element.VR == "SQ":
-                    yield from element.value
+            tags = list(group.keys())  # iterating the group itself would read every value
+            for tag in tags:
+                if dictionary_has_tag(tag) and dictionary_VR(tag) == "SQ":
+                    yield from items(group, keyword_for_tag(tag))
