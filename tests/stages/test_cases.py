@@ -201,3 +201,19 @@ def test_an_unknown_column_hides_no_other_fault(tmp_path):
     faults = _faults(tmp_path, [CASE | {"mr_lesions": "x", "laterality": "left"}])
     assert any("unknown column 'mr_lesions'" in fault for fault in faults)
     assert any("column laterality: 'left' is not permitted" in fault for fault in faults)
+
+
+@pytest.mark.parametrize(
+    ("column", "good", "bad"),
+    [("mr_series", "1.2.840.10008.5", "t1 fs"), ("patient", "p1", "Jane Doe"), ("exam", "e2", "2018/05/12")],
+)
+def test_names_of_series_and_persons(tmp_path: Path, column: str, good: str, bad: str) -> None:
+    """A series has a number or a UID, of which artefacts and logs see a digest alone; persons have pseudonyms."""
+    table = tmp_path / "cases.tsv"
+    table.write_text(f"case\tlaterality\tmr\t{column}\nc1\tL\tMR\t{good}\n")
+    row = read_cohort(table, None).cases["c1"]
+    assert getattr(row, column) == good
+    assert good not in row.values().values()
+    table.write_text(f"case\tlaterality\tmr\t{column}\nc1\tL\tMR\t{bad}\n")
+    with pytest.raises(FaultsError, match=f"column {column}"):
+        read_cohort(table, None)

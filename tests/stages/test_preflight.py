@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from stages.cohort.cases import read_cohort
-from stages.cohort.preflight import check_cohort, warnings_of
+from stages.cohort.preflight import check_cohort, choices_of, warnings_of
 from tests.shared_data import DATA, requires_shared
 from tests.stages.cohort_files import (
     AFFINE,
@@ -329,6 +329,23 @@ def test_picture_that_ends_early(folder):
     assert _faults(folder) == []
     _cut(folder / "cc.png", 0.6)
     assert any("cc.png: ends early or is damaged" in fault for fault in _faults(folder))
+
+
+def test_a_series_of_one_volume(folder):
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "mr.nii.gz", "mr_series": "4"})
+    _assert_only(folder, "column mr: ", "is one volume, and the column mr_series names a series; leave one of them out")
+
+
+def test_the_series_that_is_taken_is_named_with_what_was_left(folder):
+    """Of the folder of a patient `check` tells which series it takes, and a mask is held against that one's grid."""
+    write(folder / "MR" / "a", series("t1", SeriesNumber=4))
+    write(folder / "MR" / "b", series("t1 sub", SeriesNumber=5, count=12))
+    write_tsv(folder / "cases.tsv", {"case": "c1", "laterality": "R", "mr": "MR", "mr_labels": "mr_labels.nii.gz"})
+    write_tsv(folder / "views.tsv", {"case": "c1", "view": "CC", "image": "cc.dcm"})
+    assert "than mr (10 x 12 x 9 voxels of 1.5 x 1.5 x 2 mm" in _faults(folder)[0]
+    taken, left = choices_of(read_cohort(folder / "cases.tsv", folder / "views.tsv"))
+    assert taken.startswith("cases.tsv (c1), column mr: series 4, T1")
+    assert left == ("  left: series 5, T1, 3D, echo 1.7 ms, axial 10 x 12 x 12 voxels of 1.5 x 1.5 x 2 mm: subtraction")
 
 
 @pytest.mark.parametrize(("birthday", "told"), [("19650101", True), ("19700101", False), ("", False)])

@@ -241,12 +241,16 @@ NEEDS = {
 }
 
 
+# A patient's folder holds many times what is read of it.
+MOST_MB = 8000
+
+
 def memory_of(stage):
     """Resource function: more where files are large, and with each attempt."""
     least, _ = NEEDS[stage]
 
     def memory(wildcards, input, attempt):
-        return max(least, 400 + 12 * int(input.size_mb)) * attempt
+        return max(least, min(400 + 12 * int(input.size_mb), MOST_MB)) * attempt
 
     return memory
 
