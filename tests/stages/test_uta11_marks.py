@@ -83,7 +83,7 @@ def test_polygons_of_a_made_up_patient(example, tmp_path):
     ((name, (pixel, diameter_mm)),) = read_discs(tables.mammograms["p1R", "CC"].lesion).items()
     assert name == "lesion"
     assert pixel == pytest.approx([11.0, 17.0], abs=0.02)
-    assert diameter_mm == pytest.approx(2.0 * 5.0 * 0.2, rel=0.01)
+    assert diameter_mm == pytest.approx(2.0 * 5.0 * float(views["CC"].ImagerPixelSpacing[0]), rel=0.01)
 
 
 def test_lesions_apart_have_names_of_their_own(example):
