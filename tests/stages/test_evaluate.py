@@ -158,7 +158,7 @@ def test_views_that_are_all_of_another_size_are_flagged_together(tmp_path: Path)
             values = {"relative_size": size if view == "MLO" else 1.06}
             synthetic.write_pose(path, "R", view, (False, False), True, values=values)
         rows = evaluated(tmp_path, inputs).value("view_rows")
-        text = "all mammograms show a breast 9% smaller than the MR volume's: check their pixel spacing and thickness"
+        text = "all mammograms show a breast 9% smaller than the MR volume's between plates: check their pixel spacing"
         assert {(text in row["trust"]) for row in rows} == {doubted}
 
 

@@ -10,7 +10,7 @@ import pytest
 from mammoreg.errors import DataError
 from mammoreg.geometry import ViewGeometry, Volume
 from mammoreg.pose.size import imaged_volume_ml
-from stages.evaluate.size_doubts import size_doubts
+from stages.evaluate.size_doubts import ShownSize, size_doubts
 from stages.pose.size import check_imaged_volume, check_size
 
 VIEW = ViewGeometry(0.0, 0.0, 0.0, 0.0, 60.0, 650.0, 20.0, 0.2, 700, 400)
@@ -36,7 +36,7 @@ def test_volume_between_the_plates() -> None:
 
 def test_sound_sizes_have_no_doubt() -> None:
     values, doubts = check_imaged_volume(_facts(), _segment(200.0))
-    assert values == {"imaged_ml": pytest.approx(163.6, abs=0.1)}
+    assert values == {"imaged_ml": pytest.approx(163.6, abs=0.1), "imaged_share": pytest.approx(0.818, abs=0.001)}
     assert doubts == ()
     assert check_size(1.05, VIEW) == ()
 
@@ -73,10 +73,26 @@ def test_outlines_of_another_size_are_flagged_or_fail() -> None:
         check_size(1.6, VIEW)
 
 
+def _both(sizes: tuple[float | None, ...], share: float | None = 0.9) -> list[str]:
+    return size_doubts([ShownSize(size, share) for size in sizes])
+
+
 def test_both_views_together_tell_more_than_one() -> None:
-    """Fifteen percent of the spacing, where each view for itself may be off by five."""
-    assert size_doubts([1.12, 1.14, None]) == [
-        "all mammograms show a breast 12% smaller than the MR volume's: check their pixel spacing and thickness"
+    assert _both((1.12, 1.14, None)) == [
+        (
+            "all mammograms show a breast 12% smaller than the MR volume's between plates: "
+            "check their pixel spacing and thickness"
+        )
     ]
-    assert size_doubts([0.8, 0.82])[0].startswith("all mammograms show a breast 23% larger")
-    assert size_doubts([0.95, 1.05]) == size_doubts([1.12]) == size_doubts([None, 1.12]) == []
+    assert _both((0.8, 0.82))[0].startswith("all mammograms show a breast 23% larger")
+    assert _both((0.95, 1.05)) == _both((1.12,)) == _both((None, 1.12)) == []
+
+
+def test_a_small_outline_that_shows_little_of_the_breast_is_doubted() -> None:
+    """Twin1 with its pixel spacing 15 % too small: the plates' edge moves forward and hides half of it."""
+    wrong = [ShownSize(1.0696, 0.648), ShownSize(1.0687, 0.673)]
+    (doubt,) = size_doubts(wrong)
+    assert "a breast 6% smaller than the MR volume's between plates, and no more than 66% of its volume" in doubt
+    smallest_of_the_sound = [ShownSize(1.025, 0.63), ShownSize(1.049, 0.78)]
+    assert size_doubts(smallest_of_the_sound) == []
+    assert _both((1.07, 1.07), share=0.95) == _both((1.07, 1.07), share=None) == _both((0.97, 0.97), share=0.5) == []

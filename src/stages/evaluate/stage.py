@@ -27,7 +27,7 @@ from stages.evaluate.places import (
     lesion_rows_in_mr,
 )
 from stages.evaluate.record import EvaluateFields, Row
-from stages.evaluate.size_doubts import size_doubts
+from stages.evaluate.size_doubts import ShownSize, size_doubts
 from stages.localize.record import Predictions
 from stages.mesh.record import MeshRecord
 from stages.methods import METHODS, method_views, of_view
@@ -139,7 +139,7 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
     fits: list[Row] = []
     elongations: list[Row] = []
     poses = [PoseRecord(artefact) for artefact in inputs.artefacts("pose") if artefact.ok]
-    of_case = size_doubts([pose.relative_size for pose in poses])
+    of_case = size_doubts([ShownSize(pose.relative_size, pose.imaged_share) for pose in poses])
     for pose in sorted(poses, key=lambda pose: view_order(pose.view)):
         methods = method_views(pose, mesh.reference, results)
         doubts = [*of_case, *_landmark_doubts(inputs, pose)]

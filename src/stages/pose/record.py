@@ -203,6 +203,12 @@ class PoseRecord(Record):
         return None if size is None else float(size)
 
     @property
+    def imaged_share(self) -> float | None:
+        """Volume that the image shows over that of the MR breast; None where the thickness was unknown."""
+        share = self._given("imaged_share")
+        return None if share is None else float(share)
+
+    @property
     def force_n(self) -> float | None:
         """Plate force that header or table gives."""
         force = self._given("header_force_n")

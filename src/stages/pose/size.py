@@ -45,7 +45,9 @@ def check_imaged_volume(facts: ViewFacts, segment: SegmentRecord) -> tuple[dict[
     if not IMPOSSIBLE_SHARE[0] <= share <= IMPOSSIBLE_SHARE[1]:
         raise DataError(f"{text}: they are not of one size; {_CAUSES}{_unit_hint(view)}")
     odd = not ODD_SHARE[0] <= share <= ODD_SHARE[1]
-    return {"imaged_ml": round(shown_ml, 1)}, ((f"sizes differ: {text}",) if odd else ())
+    return {"imaged_ml": round(shown_ml, 1), "imaged_share": round(share, 4)}, (
+        (f"sizes differ: {text}",) if odd else ()
+    )
 
 
 def _volume_ml(segment: SegmentRecord) -> float:
