@@ -54,6 +54,13 @@ def test_a_bright_column_of_the_detector_is_no_outline():
     assert _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0]).max() < 0.6
 
 
+def test_edge_of_a_paddle_in_the_air_is_no_outline():
+    image = breast_image(noise=1.0)
+    image[60:600, :340] += 30.0
+    found = analyse(image, PIXEL_MM, "CC")
+    assert _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0]).max() < 0.6
+
+
 def test_air_without_a_step_to_the_breast_is_refused():
     slope = (200.0 * np.exp(-3.0 * inside_share())).astype(np.float32)
     with pytest.raises(DataError, match="no grey step between breast and air"):

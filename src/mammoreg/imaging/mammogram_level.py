@@ -1,5 +1,6 @@
 """The grey level at which a mammogram's breast ends: where the outline has a step, however the air glows."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,8 @@ from mammoreg.imaging.mammogram_step import GreyScale, grey_scale, grey_step
 # All chosen.
 STEPPED_SHARE = 0.97  # of the free outline, along which a level's step must stand
 _HIGHER = 1.3  # step of the next level's contour that shows that the first one lies outside of it
+_FAR_HIGHER = 3.0  # step of a contour well within the first one that shows that the first one is not the breast's
+_WITHIN_SHARE = 0.8  # of its area
 LEAST_STEPPED_SHARE = 0.6  # with less of it there is no outline
 _GRID_MM = 0.5  # of the image on which levels are tried
 _LEVELS = np.geomspace(0.002, 0.5, 20)  # shares of the range above air that are tried
@@ -38,11 +41,22 @@ class EdgeLevel:
     scale: GreyScale
 
 
+@dataclass(frozen=True)
+class _Contour:
+    """A level's contour: share of it along which a step stands, the step's median height, the area within."""
+
+    level: float
+    share: float
+    step: float
+    area: int
+
+
 def find_level(pixels: Floats32, smooth: Floats32, air: Air, pixel_mm: float) -> EdgeLevel:
     """The lowest level above the air whose contour has a step almost everywhere, else the one that has most of it.
 
     Air that glows beside the breast lies above the air at the border, and its contours have no step. Skin that fades
-    into the air must be cut at its foot, for higher up there is none either.
+    into the air must be cut at its foot, for higher up there is none either. A paddle's edge has a step too, but a
+    greater one, the breast's, lies well within.
 
     Args:
         pixels: canonical image.
@@ -55,21 +69,30 @@ def find_level(pixels: Floats32, smooth: Floats32, air: Air, pixel_mm: float) ->
     factor = max(1, round(_GRID_MM / pixel_mm))
     coarse, grid_mm = smoothed(block_mean(smooth, factor), factor * pixel_mm), factor * pixel_mm
     floor = air.level + max(0.5 * scale.least_step, NOISE_SIGMAS * air.noise)
-    best, best_share, best_step, fault = floor, -1.0, 0.0, None
+    tried, faults = [], []
     for level in (floor, *(n for n in air.level + _LEVELS * scale.reach if n > floor)):
         try:
-            share, step = _step_of(coarse, level, grid_mm, scale)
+            tried.append(_contour_at(coarse, level, grid_mm, scale))
         except DataError as error:
-            fault = fault or error
-            continue
-        # A contour just outside the step sees part of it.
-        if best_share >= STEPPED_SHARE and (share < STEPPED_SHARE or step < _HIGHER * best_step):
-            break
-        if share > best_share or share >= STEPPED_SHARE:
-            best, best_share, best_step = level, share, step
-    if best_share < 0.0 and fault is not None:
-        raise fault
-    return EdgeLevel(best, scale)
+            faults.append(error)
+    if not tried:
+        raise faults[0]
+    return EdgeLevel(_chosen(tried).level, scale)
+
+
+def _chosen(tried: Sequence[_Contour]) -> _Contour:
+    """Of contours of rising level the one that is the breast's."""
+    stepped = [contour for contour in tried if contour.share >= STEPPED_SHARE]
+    if not stepped:
+        return max(tried, key=lambda contour: contour.share)
+    best = stepped[0]
+    for contour in stepped[1:]:
+        # A contour just outside the step sees part of it; that of a paddle or of a plateau of glow is another's.
+        next_level = tried.index(contour) == tried.index(best) + 1
+        within = contour.area < _WITHIN_SHARE * best.area and contour.step >= _FAR_HIGHER * best.step
+        if within or (next_level and contour.step >= _HIGHER * best.step):
+            best = contour
+    return best
 
 
 def _scale_of(pixels: Floats32, smooth: Floats32, air: Air) -> GreyScale:
@@ -85,17 +108,19 @@ def _scale_of(pixels: Floats32, smooth: Floats32, air: Air) -> GreyScale:
     return grey_scale(pixels, smooth, air.level, threshold, noise)
 
 
-def _step_of(image: Floats32, level: float, grid_mm: float, scale: GreyScale) -> tuple[float, float]:
-    """Share of the free contour of a level along which the step stands, and its median height.
+def _contour_at(image: Floats32, level: float, grid_mm: float, scale: GreyScale) -> _Contour:
+    """The step across the free contour of a level.
 
     Raises:
         DataError: no breast at this level, or too little of its contour is free.
     """
-    contour, free = _contour(breast_mask(image, level, grid_mm), grid_mm)
+    mask = breast_mask(image, level, grid_mm)
+    contour, free = _contour(mask, grid_mm)
     if free.sum() * grid_mm < _LEAST_FREE_MM:
         raise DataError("the breast in the mammogram shows no edge against air; the image is cropped too tightly")
     found = grey_step(image, contour, grid_mm, scale)
-    return float(found.stands[free].mean()), float(np.median(found.height[free]))
+    stands, height = float(found.stands[free].mean()), float(np.median(found.height[free]))
+    return _Contour(level, stands, height, int(mask.sum()))
 
 
 def _contour(mask: NDArray[np.bool_], grid_mm: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
