@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pydicom import dcmread
-from pydicom.uid import generate_uid
+from pydicom.dataelem import RawDataElement
+from pydicom.tag import Tag
+from pydicom.uid import ImplicitVRLittleEndian, RLELossless, generate_uid
 
 from stages.cohort.cases import read_cohort
 from stages.cohort.preflight import check_cohort
+from stages.cohort.readers.mammogram import read_mammogram
 from stages.cohort.readers.mr import read_mr
 from stages.command.main import main
 from tests.stages.cohort_files import COLUMNS, ROWS, write_dicom
@@ -203,6 +206,21 @@ def test_examinations_are_paired_by_their_days(tmp_path):
     assert_no_secret(tmp_path / "out", tmp_path / "in")
 
 
+def test_a_breast_whose_pixels_cannot_be_read_does_not_stop_the_others(tmp_path, capsys):
+    for patient in ("Doe^Jane", "Roe^Ann"):
+        slices = series("t1", patient=patient)
+        if patient == "Roe^Ann":
+            slices[3].PixelData = slices[3].PixelData[:50]
+        write(tmp_path / "in" / f"mr {patient}", slices)
+        write_views(tmp_path / "in" / f"mg {patient}", patient, "RCC")
+    assert main(["import", str(tmp_path / "in"), str(tmp_path / "out")]) == 0
+    assert "1 breast with 1 mammogram, of 2 patients found" in capsys.readouterr().out
+    assert len(rows(tmp_path / "out" / "cases.tsv")) == len(rows(tmp_path / "out" / "views.tsv")) == 1
+    last = rows(tmp_path / "out" / "import.tsv")[-1]
+    assert last["why"] == "left after all: pixels are missing or cannot be decoded; export the series again"
+    assert_no_secret(tmp_path / "out", tmp_path / "in")
+
+
 def test_implants_and_images_without_side_are_left(tmp_path):
     write(tmp_path / "in" / "mr", series("t1"))
     write_views(tmp_path / "in" / "mg", "Doe^Jane", "RCC")
@@ -216,3 +234,30 @@ def test_implants_and_images_without_side_are_left(tmp_path):
     assert "which side and view it is" in told
     assert "pixel spacing" in told
     assert "has MR and no mammogram that can be used" in told
+
+
+@pytest.mark.parametrize("form", ["RLE", "implicit", "decimal comma"])
+def test_copies_keep_pixels_and_numbers_however_they_were_stored(tmp_path, form):
+    """Compressed pixels, values without a type and numbers that are none for DICOM come through as they are."""
+    write(tmp_path / "in" / "mr", series("t1"))
+    write_views(tmp_path / "in" / "mg", "Doe^Jane", "RCC")
+    (path,) = (tmp_path / "in" / "mg").iterdir()
+    header = dcmread(path)
+    pixels = header.pixel_array.copy()
+    if form == "RLE":
+        header.compress(RLELossless)
+    elif form == "implicit":
+        header.file_meta.TransferSyntaxUID = ImplicitVRLittleEndian
+    else:
+        header._dict[Tag("BodyPartThickness")] = RawDataElement(
+            Tag("BodyPartThickness"), "DS", 4, b"52,5", 0, False, True
+        )
+    header.save_as(path, enforce_file_format=True)
+    assert main(["import", str(tmp_path / "in"), str(tmp_path / "out")]) == 0
+    copy = tmp_path / "out" / "mammograms" / "p1R_CC.dcm"
+    one, other = (read_mammogram(file, {}, "R", "CC") for file in (path, copy))
+    assert np.array_equal(one.pixels, other.pixels)
+    assert np.array_equal(dcmread(copy).pixel_array, pixels)
+    assert one.facts == other.facts
+    assert one.facts.thickness_mm == (52.5 if form == "decimal comma" else 50.0)
+    assert_no_secret(tmp_path / "out", tmp_path / "in")

@@ -49,16 +49,16 @@ def run_import(given: argparse.Namespace) -> int:
     planned = plan(found)
     if not planned.breasts:
         raise UserError(f"{given.folder}: holds no breast with MR and a mammogram{_reasons(planned.entries)}")
-    write_import(
+    written = write_import(
         planned,
         given.out,
         lambda breasts: _shown(breasts, "breasts written"),
         link=given.link,
         with_paths=given.with_paths,
     )
-    views = sum(len(breast.images) for breast in planned.breasts)
-    left = sum(entry.used_for == "" for entry in planned.entries)
-    counts = _count(len(planned.breasts), "breast"), _count(views, "mammogram"), _count(len(found.patients), "patient")
+    views = sum(len(breast.images) for breast in written)
+    left = sum(entry.used_for == "" for entry in planned.entries) + len(planned.breasts) - len(written)
+    counts = _count(len(written), "breast"), _count(views, "mammogram"), _count(len(found.patients), "patient")
     print(f"{counts[0]} with {counts[1]}, of {counts[2]} found: {given.out}")
     print(f"{_count(left, 'line')} of {given.out / ACCOUNT} say what was left, and why")
     for path, reason in found.unread:

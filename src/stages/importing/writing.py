@@ -25,8 +25,10 @@ CASES, VIEWS, ACCOUNT = "cases.tsv", "views.tsv", "import.tsv"
 Watched = Callable[[Sequence[Breast]], Iterable[Breast]]
 
 
-def write_import(plan: Plan, out: Path, watched: Watched, *, link: bool = False, with_paths: bool = False) -> None:
-    """Write what was planned.
+def write_import(
+    plan: Plan, out: Path, watched: Watched, *, link: bool = False, with_paths: bool = False
+) -> list[Breast]:
+    """Write what was planned; a breast whose pixels cannot be read is left, and the account says why.
 
     Args:
         plan: the rows and the account.
@@ -35,27 +37,52 @@ def write_import(plan: Plan, out: Path, watched: Watched, *, link: bool = False,
         link: links to the files as they are in place of copies without identity.
         with_paths: the account names the files.
 
+    Returns:
+        The breasts that are written.
+
     Raises:
-        UserError: the folder is there, or cannot be written.
-        DataError: pixels that the headers promise cannot be read.
+        UserError: the folder is there, cannot be written, or would hold no breast.
     """
+    written: list[Breast] = []
+    entries = list(plan.entries)
+    cases: list[dict[str, str]] = []
+    views: list[dict[str, str]] = []
     with _made(out) as folder:
-        mr: dict[int, str] = {}
-        cases, views = [], []
+        volumes: dict[int, str] = {}
         for breast in watched(plan.breasts):
-            if id(breast.stack) not in mr:
-                shared = sum(other.stack is breast.stack for other in plan.breasts) > 1
-                name = f"{breast.patient}{breast.exam}" if shared else breast.case
-                mr[id(breast.stack)] = _write_mr(folder, breast, name, link)
+            shared = sum(other.stack is breast.stack for other in plan.breasts) > 1
+            name = f"{breast.patient}{breast.exam}" if shared else breast.case
+            try:
+                if id(breast.stack) not in volumes:
+                    volumes[id(breast.stack)] = _write_mr(folder, breast, name, link)
+                images = {
+                    view: _write_image(folder, breast, view, image, link) for view, image in breast.images.items()
+                }
+            except DataError as error:
+                entries.append(
+                    Entry(breast.patient, breast.case, "", f"left after all: {_without_paths(error, breast)}")
+                )
+                continue
             exam = {"exam": breast.exam} if breast.exam else {}
-            row = {"case": breast.case, "laterality": breast.side, "mr": mr[id(breast.stack)]}
+            row = {"case": breast.case, "laterality": breast.side, "mr": volumes[id(breast.stack)]}
             cases.append(row | {"patient": breast.patient} | exam)
-            for view, image in breast.images.items():
-                name = _write_image(folder, breast, view, image, link)
-                views.append({"case": breast.case, "view": view, "image": name})
+            views += [{"case": breast.case, "view": view, "image": image} for view, image in images.items()]
+            written.append(breast)
+        if not written:
+            raise UserError(f"nothing can be written: {'; '.join(entry.why for entry in entries[len(plan.entries) :])}")
         (folder / CASES).write_text(_table(cases), encoding="utf-8")
         (folder / VIEWS).write_text(_table(views), encoding="utf-8")
-        (folder / ACCOUNT).write_text(_account(plan.entries, with_paths), encoding="utf-8")
+        (folder / ACCOUNT).write_text(_account(entries, with_paths), encoding="utf-8")
+    return written
+
+
+def _without_paths(error: DataError, breast: Breast) -> str:
+    """A message without the names of files, which may be names of patients."""
+    files = [*(frame.file for frame in breast.stack.frames), *(image.path for image in breast.images.values())]
+    text = str(error)
+    for path in files:
+        text = text.removeprefix(f"{path}: ")
+    return text
 
 
 @contextmanager
