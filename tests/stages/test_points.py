@@ -155,6 +155,7 @@ def test_tables_as_other_programs_write_them(tmp_path: Path, content: bytes) -> 
         ("name;column;row\na;1,5;2\n", "'1,5' is no number; write a decimal point"),
         ("name\tcolumn\trow\na\t1\tnan\n", "line 2, column row: 'nan' is no number"),
         ("name\tcolumn\trow\n\t1\t2\n", "is empty"),
+        ("column\trow\tname\n1\t2\n", "is empty"),
         ("name\tcolumn\trow\na\t1\t2\nb\t1\t2\na\t3\t4\n", "line 4: name 'a' is given twice"),
     ],
 )

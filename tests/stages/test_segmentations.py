@@ -1,5 +1,6 @@
 """Lesion masks as segmentations: 3D Slicer's `.seg.nrrd` and DICOM SEG, placed as their headers say."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydicom.uid import ExplicitVRLittleEndian
 
 from mammoreg.errors import DataError
 from stages.cohort.readers.masks import mask_names, read_masks
+from stages.cohort.readers.points import is_list, read_spheres
 
 ORIGIN = np.array([-20.0, -30.0, 5.0])
 SPACING = np.array([1.0, 1.5, 3.0])
@@ -195,3 +197,42 @@ def test_dicom_that_is_no_segmentation(tmp_path):
     (tmp_path / "notes.docx").write_text("mass")
     with pytest.raises(DataError, match="is no lesion mask; give"):
         read_masks(tmp_path / "notes.docx")
+
+
+def _files_of_marks(folder: Path) -> list[Path]:
+    square = _square(slice(2, 5), slice(2, 6))
+    point = {"label": "F-1", "position": [1.0, 2.0, 3.0], "description": "12 mm", "positionStatus": "defined"}
+    node = {"type": "Fiducial", "coordinateSystem": "LPS", "coordinateUnits": "mm", "controlPoints": [point]}
+    (folder / "F.mrk.json").write_text(json.dumps({"markups": [node]}))
+    columns = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
+    head = f"# Markups fiducial file version = 5.6\n# CoordinateSystem = LPS\n# columns = {columns}\n"
+    (folder / "F.fcsv").write_text(head + '1,1,2,3,0,0,0,1,1,1,0,"F-1",12 mm,\n')
+    (folder / "F.tsv").write_text("name\tx\ty\tz\tdiameter_mm\nF-1\t1\t2\t3\t12\n")
+    return [
+        folder / "F.mrk.json",
+        folder / "F.fcsv",
+        folder / "F.tsv",
+        _nrrd(folder / "S.seg.nrrd", _two_balls(), _segments("mass A", "mass B")),
+        _seg(folder / "seg.dcm", [(3, 1, square), (2, 1, square)], {1: "mass"}),
+    ]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_damaged_files_of_marks_are_read_or_refused(tmp_path):
+    """Bytes altered, left out and cut off, by a fixed seed: nothing but a mark or a message comes of it."""
+    random = np.random.default_rng(9)
+    refused: list[tuple[str, str]] = []
+    for path in _files_of_marks(tmp_path):
+        whole = path.read_bytes()
+        for _ in range(40):
+            content = bytearray(whole)
+            for place in random.integers(0, len(content), size=random.integers(1, 6)):
+                content[place] = random.integers(0, 256)
+            cut = len(content) if random.random() < 0.6 else int(random.integers(0, len(content)))
+            path.write_bytes(bytes(content[:cut]))
+            try:
+                assert read_spheres(path) if is_list(path) else read_masks(path)
+            except DataError as error:
+                refused.append((path.name, str(error)))
+    assert len(refused) > 60
+    assert all(name in message for name, message in refused)

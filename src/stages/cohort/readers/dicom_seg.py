@@ -14,6 +14,7 @@ _SEG_STORAGE = ("1.2.840.10008.5.1.4.1.1.66.4", "1.2.840.10008.5.1.4.1.1.66.7")
 _STEP_TOLERANCE = 0.05
 """Frames may lie off whole steps by this share of one."""
 _SAME_DIRECTION = 1e-3
+_UNIT = 0.01
 
 
 def read_dicom_seg(path: Path) -> dict[str, Volume]:
@@ -29,7 +30,7 @@ def read_dicom_seg(path: Path) -> dict[str, Volume]:
         names = {int(s.SegmentNumber): str(s.get("SegmentLabel") or s.SegmentNumber) for s in data.SegmentSequence}
         places = [_place(data, number) for number in range(len(frames))]
         numbers = [_segment_number(data, number) for number in range(len(frames))]
-    except (AttributeError, IndexError, KeyError, TypeError, ValueError, NotImplementedError, RuntimeError) as error:
+    except Exception as error:  # damaged elements raise what their types do, pixels what decodes them does
         raise DataError(f"{path}: its frames lack pixels, place or segment; export the segmentation again") from error
     index, affine = _grid(path, data, places)
     if len(set(names.values())) < len(names):
@@ -49,13 +50,12 @@ def read_dicom_seg(path: Path) -> dict[str, Volume]:
 
 def _dataset(path: Path) -> Any:
     from pydicom import dcmread
-    from pydicom.errors import InvalidDicomError
 
     files = [p for p in sorted(path.iterdir()) if p.is_file()] if path.is_dir() else [path]
     try:
         (file,) = files
         data = dcmread(file)
-    except (OSError, InvalidDicomError, EOFError, ValueError, TypeError) as error:
+    except Exception as error:  # pydicom raises many kinds at damaged files
         raise DataError(
             f"{path}: is no lesion mask; give .nii.gz, .seg.nrrd, a DICOM SEG, or a .tsv with name x y z diameter_mm"
         ) from error
@@ -94,6 +94,9 @@ def _grid(path: Path, data: Any, places: Sequence[Any]) -> tuple[NDArray[np.intp
     directions, spacing = np.array([d for _, d, _ in places]), np.array([s for _, _, s in places])
     alike = np.ptp(directions, axis=0).max() < _SAME_DIRECTION and np.ptp(spacing, axis=0).max() < _SAME_DIRECTION
     along_row, along_column = directions[0]
+    sound = np.allclose(directions[0] @ directions[0].T, np.eye(2), atol=_UNIT) and spacing.min() > 0.0
+    if not sound or not np.isfinite(positions).all():
+        raise DataError(f"{path}: its header gives no sensible place of the frames; export the segmentation again")
     normal = np.cross(along_row, along_column)
     heights = positions @ normal
     aside = positions - heights[:, None] * normal

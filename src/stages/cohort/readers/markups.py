@@ -78,19 +78,27 @@ def _fcsv_marks(path: Path) -> Iterator[Mark]:
         raise DataError(f"{path}: its header names no column {', '.join(missing)}; save the markups again")
     for number, line in enumerate(lines, start=1):
         if line.strip() and not line.startswith("#"):
-            cells = dict(zip(columns, next(csv.reader([line])), strict=False))
+            cells = dict(zip(columns, _cells(line), strict=False))
             place = _vector(f"{path}, line {number}", [cells.get(axis) for axis in "xyz"])
             yield Mark(cells.get("label", "").strip(), place * to_lps, _diameter(cells.get("desc")))
+
+
+def _cells(line: str) -> list[str]:
+    try:
+        return next(csv.reader([line]))
+    except csv.Error:
+        return []
 
 
 def _json_marks(path: Path) -> Iterator[Mark]:
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
-        markups = [dict(markup) for markup in content["markups"]]
-    except (OSError, UnicodeDecodeError, ValueError, TypeError, KeyError) as error:
+        for markup in content["markups"]:
+            yield from _marks_of(path, dict(markup))
+    except DataError:
+        raise
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise DataError(f"{path}: is no markups file of 3D Slicer; save the markups again as .mrk.json") from error
-    for markup in markups:
-        yield from _marks_of(path, markup)
 
 
 def _marks_of(path: Path, markup: Mapping[str, Any]) -> Iterator[Mark]:

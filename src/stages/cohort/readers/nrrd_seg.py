@@ -23,6 +23,15 @@ def read_nrrd(path: Path) -> dict[str, Volume]:
         DataError: unreadable, without a frame, or without a segment.
     """
     image = _image(path)
+    try:
+        return _volumes(path, image)
+    except DataError:
+        raise
+    except (ValueError, IndexError, KeyError, RuntimeError) as error:
+        raise DataError(f"{path}: its segments are not told as 3D Slicer does; save the segmentation again") from error
+
+
+def _volumes(path: Path, image: Any) -> dict[str, Volume]:
     affine = np.eye(4)
     affine[:3, :3] = np.array(image.GetDirection()).reshape(3, 3) * np.array(image.GetSpacing())
     affine[:3, 3] = image.GetOrigin()

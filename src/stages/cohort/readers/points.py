@@ -89,7 +89,7 @@ def _rows(path: Path, columns: tuple[str, ...]) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {}
     for number, line in table.rows:
         cells = dict(zip(header, line, strict=False))
-        name = cells["name"]
+        name = cells.get("name", "")
         if not name or name in found:
             raise DataError(f"{path}, line {number}: name {name!r} is {'given twice' if name else 'empty'}")
         found[name] = [_number(path, number, column, cells.get(column)) for column in columns]
