@@ -259,6 +259,30 @@ def test_multi_frame_with_a_stack_for_each_breast(tmp_path):
     assert "other breast" in why
 
 
+def test_the_side_that_a_header_names(tmp_path):
+    """A small volume is of the breast that its header names, unless the table names the series; a wide one of both."""
+    write(tmp_path / "one", series("t1 left", SeriesNumber=3))
+    assert "series 3" in taken(tmp_path / "one", side="L")
+    with pytest.raises(DataError, match="shows the other breast, its header says; name one"):
+        read_mr(tmp_path / "one", "R")
+    assert "series 3" in taken(tmp_path / "one", side="R", wanted="3")
+    write(
+        tmp_path / "wide",
+        again(
+            series(
+                "t1",
+                axes=SAGITTAL,
+                count=22,
+                step_mm=14.0,
+                start=(160.0, 0.0, 0.0),
+                field=lambda p: linear_field(p) + 900.0,
+            ),
+            Laterality="L",
+        ),
+    )
+    assert "T1" in taken(tmp_path / "wide", side="R")
+
+
 def test_a_series_for_a_biopsy_comes_last(tmp_path):
     write(tmp_path / "a", series("t1 biopsy grid", SeriesNumber=2, step_mm=1.0, count=18))
     write(tmp_path / "b", series("t1", SeriesNumber=3))

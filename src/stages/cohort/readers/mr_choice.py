@@ -75,7 +75,10 @@ def _reasons(stacks: Sequence[MrStack], side: Laterality | None, *, by_name: boo
     reasons = [stack.fault or ("" if by_name else mr_kind.no_anatomy(stack)) for stack in stacks]
     volumes = [stack for stack, reason in zip(stacks, reasons, strict=True) if not reason]
     if side is not None:
-        reasons = [reason or _other_breast(s, volumes, side) for s, reason in zip(stacks, reasons, strict=True)]
+        reasons = [
+            reason or _other_breast(s, volumes, side, by_name=by_name)
+            for s, reason in zip(stacks, reasons, strict=True)
+        ]
     if by_name or len(volumes) == 1:
         return reasons
     return [reason or _not_t1(stack) for stack, reason in zip(stacks, reasons, strict=True)]
@@ -85,10 +88,10 @@ def _not_t1(stack: MrStack) -> str:
     return "is T2-weighted, not T1" if mr_kind.weighting(stack) == "T2" else ""
 
 
-def _other_breast(stack: MrStack, volumes: Sequence[MrStack], side: Laterality) -> str:
+def _other_breast(stack: MrStack, volumes: Sequence[MrStack], side: Laterality, *, by_name: bool) -> str:
     """Whether a volume of one breast shows the other one: by name, or as another one lies beyond it."""
     named = mr_kind.named_side(stack)
-    if named and named != side:
+    if named and named != side and stack.half_extent[0] < _ONE_BREAST_MM / 2.0 and not by_name:
         return "shows the other breast, its header says"
     sign = 1.0 if side == "L" else -1.0
     for other in volumes:
