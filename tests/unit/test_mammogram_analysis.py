@@ -5,6 +5,7 @@ import pytest
 
 from mammoreg.errors import DataError
 from mammoreg.imaging.mammogram import analyse
+from mammoreg.imaging.mammogram_canonical import canonicalise
 from tests.unit.mammogram_images import (
     DEPTH_MM,
     HALF_HEIGHT_MM,
@@ -59,6 +60,24 @@ def test_edge_of_a_paddle_in_the_air_is_no_outline():
     image[60:600, :340] += 30.0
     found = analyse(image, PIXEL_MM, "CC")
     assert _distance_to_ellipse_mm(found.outline[found.outline_weight >= 1.0]).max() < 0.6
+
+
+def test_breast_cut_at_the_anterior_edge_says_how_far_it_is_cut():
+    cut = analyse(breast_image()[:, :277], PIXEL_MM, "CC")
+    assert cut.cut_mm == pytest.approx(
+        2.0 * HALF_HEIGHT_MM * np.sqrt(1.0 - (275.0 * PIXEL_MM / DEPTH_MM) ** 2), abs=2.5
+    )
+    assert cut.mask[MIDDLE_ROW - 100, :150].all()
+    assert cut.mask[MIDDLE_ROW + 100, :150].all()
+    assert cut.outline_weight[cut.outline[:, 0] > 270.0].max() < 0.3
+    assert analyse(breast_image(), PIXEL_MM, "CC").cut_mm == 0.0
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_breast_cut_so_far_that_no_edge_shows_air_is_refused(dark):
+    cut = breast_image()[40:620, :230]
+    with pytest.raises(DataError, match="cut at its anterior edge"):
+        canonicalise(4095.0 - cut if dark else cut, "L", "CC")
 
 
 def test_air_without_a_step_to_the_breast_is_refused():

@@ -32,6 +32,7 @@ class MammogramAnalysis:
         nipple: (2,) of (column, row), or None where it is not seen in profile.
         step: median grey step across the outline where it is skin, as a share of the breast's range of grey values.
         stepped_share: share of that outline along which the step stands out from noise and slopes.
+        cut_mm: length over which the image's anterior edge cuts the breast.
     """
 
     mask: NDArray[np.bool_]
@@ -41,6 +42,7 @@ class MammogramAnalysis:
     nipple: NDArray[np.float64] | None
     step: float
     stepped_share: float
+    cut_mm: float
 
 
 def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnalysis:
@@ -60,6 +62,7 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
     smooth = smoothed(image, spacing)
     edge = find_level(image, smooth, air, spacing)
     mask = breast_mask(smooth, edge.level, spacing)
+    cut_mm = float(mask[:, -2:].any(axis=1).sum()) * spacing
     outline, mask = outline_polyline(smooth, mask, edge.level, edge.scale.reach, air, spacing)
     pectoral = _pectoral(image, mask, spacing, view)
     weight = outline_weight(outline, mask, pectoral, spacing)
@@ -73,6 +76,7 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
         nipple=None if nipple is None else _to_full(nipple, factor),
         step=step,
         stepped_share=stepped,
+        cut_mm=cut_mm,
     )
 
 

@@ -13,6 +13,7 @@ Side = Literal["left", "right"]
 
 _STRIP_SHARE = 0.02
 _FLAT_SHARE = 0.05
+_UNEVEN_SHARE = 0.3
 _DIFFERENT_SHARE = 0.1
 _LEAST_BREAST_SHARE = 0.03
 
@@ -40,7 +41,7 @@ def find_air(pixels: NDArray[Any]) -> Air:
     The edge with the smaller spread of grey values is the nipple's side: it shows little but air.
 
     Raises:
-        DataError: If the image is not finite, or shows no breast: nothing stands out from the air.
+        DataError: If the image is not finite, or shows no breast (nothing stands out from the air), or no air.
     """
     image = np.asarray(pixels, dtype=np.float32)
     if image.ndim != 2 or min(image.shape) < 16:
@@ -51,7 +52,23 @@ def find_air(pixels: NDArray[Any]) -> Air:
     side = _air_side(image, strips)
     level = float(np.median(strips[side]))
     noise = 1.4826 * float(np.median(np.abs(strips[side] - level)))
-    return Air(level, noise, side, bright=_breast_is_darker(image, level, noise))
+    bright = _breast_is_darker(image, level, noise)
+    _refuse_covered(image, strips[side])
+    return Air(level, noise, side, bright)
+
+
+def _refuse_covered(image: Floats32, strip: Floats32) -> None:
+    """Refuse a strip that is no air over a tenth of its length: level and polarity would be the breast's.
+
+    Raises:
+        DataError: with the remedy.
+    """
+    uneven = float(np.ptp(np.percentile(strip, (10, 90))))
+    if uneven > _UNEVEN_SHARE * float(np.ptp(np.percentile(image, (1, 99)))):
+        raise DataError(
+            "neither the left nor the right edge of the mammogram shows air: the breast is cut at its anterior edge, "
+            "or something covers it; give an image that shows the breast's front, or exclude the view"
+        )
 
 
 def _border_strips(image: Floats32) -> dict[Side, Floats32]:

@@ -83,7 +83,9 @@ def _only_breast(smooth: Floats32, mask: NDArray[np.bool_], level: float, air: A
     deep = ndimage.minimum_filter(mask, width)
     # What is bright beside the breast is a line or a letter that was left out.
     image = np.where(near & (mask | (smooth < level)), smooth, np.float32(air.level))
-    return np.asarray(np.where(deep, smooth.max(), image), dtype=np.float32)
+    image = np.where(deep, smooth.max(), image)
+    # A breast that the anterior edge cuts has one outline, along that edge, not two.
+    return np.asarray(np.pad(image, ((0, 0), (0, 2)), constant_values=air.level), dtype=np.float32)
 
 
 def _longest_contour(image: Floats32, level: float) -> NDArray[np.float64]:

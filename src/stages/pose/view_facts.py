@@ -23,6 +23,8 @@ from stages.pose.record import ImageOutline, ImageStorage
 
 UNSTEPPED_SHARE = 0.05
 """More of an outline without a grey step across it is a doubt; on 22 real mammograms it was at most 0.01."""
+CUT_MM = 5.0
+"""More of a breast cut at the image's anterior edge is a doubt; chosen: less is a nipple."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,11 @@ def _facts(outlined: OutlinedMammogram, facts: MammogramFacts) -> ViewFacts:
 
 def _outline_doubts(found: MammogramAnalysis) -> tuple[str, ...]:
     missing = 1.0 - found.stepped_share
-    return (f"no grey step across {missing:.0%} of the outline",) if missing > UNSTEPPED_SHARE else ()
+    doubts = {
+        f"no grey step across {missing:.0%} of the outline": missing > UNSTEPPED_SHARE,
+        f"breast cut over {found.cut_mm:.0f} mm at the image's anterior edge": found.cut_mm > CUT_MM,
+    }
+    return tuple(text for text, holds in doubts.items() if holds)
 
 
 def facts_of_second_volume(mask: Volume) -> ViewFacts:
