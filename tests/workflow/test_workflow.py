@@ -46,6 +46,7 @@ def test_whole_cohort(finished):
     assert (results / "tables" / "complete.txt").read_text() == "a\tok\nb\tok\n"
     names = {path.name for path in (results / "a").glob("*.h5")}
     assert {"segment.h5", "pose.CC.h5", "solve.MLO.h5", "localize.h5", "figures.h5"} <= names
+    assert (results / "b" / "solve.LMO.h5").exists()
     assert "2 of 2 cases" in done.stdout
     assert "all cases complete" in done.stdout
     assert len(done.stdout.splitlines()) < 25, "a few lines a case, not five a job"
@@ -126,7 +127,7 @@ def test_thickness_of_one_view_reruns_that_view_only(finished):
     project, cohort, _ = finished
     table = cohort / "views.tsv"
     text = table.read_text()
-    table.write_text(text.replace("a\tCC\ta_CC.png\t0.2\t50", "a\tCC\ta_CC.png\t0.2\t55"))
+    table.write_text(text.replace("a\tCC\ta_CC.png\t1\t50", "a\tCC\ta_CC.png\t1\t55"))
     output = snakemake(project, *_keys(cohort), "-n").stdout
     table.write_text(text)
     assert "a CC: pose" in output

@@ -90,7 +90,7 @@ def _mechanics(stage: Stage) -> str:
 
 
 def make_cohort(folder: Path, cases: tuple[str, ...] = ("a", "b", "c")) -> Path:
-    """Tables and small files of a cohort: each case an MR volume and a CC and MLO picture."""
+    """Tables and small files of a cohort: each case an MR volume and a picture of CC and of MLO, of b LMO."""
     folder.mkdir(parents=True)
     rng = np.random.default_rng(1)
     case_lines = ["case\tlaterality\tmr\tmr_landmarks"]
@@ -100,9 +100,9 @@ def make_cohort(folder: Path, cases: tuple[str, ...] = ("a", "b", "c")) -> Path:
         volume = rng.normal(size=(10, 11, 12)).astype(np.float32)
         nibabel.save(nibabel.Nifti1Image(volume, np.diag([1.4, 1.4, 1.4, 1.0])), folder / f"{case}.nii.gz")
         case_lines.append(f"{case}\tR\t{case}.nii.gz\tpoints.tsv")
-        for view in ("CC", "MLO"):
-            Image.fromarray(rng.integers(0, 255, (30, 20), dtype=np.uint8)).save(folder / f"{case}_{view}.png")
-            view_lines.append(f"{case}\t{view}\t{case}_{view}.png\t0.2\t50")
+        for view in ("CC", "LMO" if case == "b" else "MLO"):
+            Image.fromarray(rng.integers(0, 255, (60, 40), dtype=np.uint8)).save(folder / f"{case}_{view}.png")
+            view_lines.append(f"{case}\t{view}\t{case}_{view}.png\t1\t50")
     (folder / "cases.tsv").write_text("\n".join(case_lines) + "\n")
     (folder / "views.tsv").write_text("\n".join(view_lines) + "\n")
     return folder

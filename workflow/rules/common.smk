@@ -19,6 +19,7 @@ from stages.engine.registry import (
     stage_digest,
 )
 from stages.tables.record import CSV_FILES
+from stages.views import IMAGED, SECOND_VOLUME
 
 PROJECT = Path(workflow.basedir)
 
@@ -52,7 +53,7 @@ TABLES = {
 
 wildcard_constraints:
     case="[A-Za-z0-9_-]+",
-    view="CC|MLO|3D",
+    view="|".join((*IMAGED, SECOND_VOLUME)),
 
 
 def made_files():
