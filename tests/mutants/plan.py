@@ -8,11 +8,12 @@ import numpy as np
 from numpy.random import Generator
 
 from tests.mutants.mutations import damage, harmless, mammogram_headers, mammogram_pictures, marks, mr_dicom, mr_nifti
+from tests.mutants.mutations import harmless_volumes as volumes
 from tests.mutants.mutations import tables as tables_
 from tests.mutants.mutations.registry import Mutation
 
 SEED = 9
-MODULES = (damage, mammogram_headers, mammogram_pictures, mr_nifti, mr_dicom, marks, tables_, harmless)
+MODULES = (damage, mammogram_headers, mammogram_pictures, mr_nifti, mr_dicom, marks, tables_, volumes, harmless)
 
 
 @dataclass(frozen=True)

@@ -173,8 +173,11 @@ for _factor in (10.0, 0.1, 1.18, 0.85):
         f"ImagerPixelSpacing of both views times {_factor:g}",
         partial(scaled, tag="ImagerPixelSpacing", factor=_factor, both=True),
     )
-HEADERS.add("other side", other_side)
-HEADERS.add("ViewPosition of the other view", other_view)
+for _tag, _factor in (("ImagerPixelSpacing", 10.0), ("ImagerPixelSpacing", 1.18), ("BodyPartThickness", 0.1)):
+    _real = partial(scaled, tag=_tag, factor=_factor)
+    HEADERS.add(f"real: {_tag} times {_factor:g}", _real, bases=("twin", "victre"))
+HEADERS.add("other side", other_side, bases=("nifti", "both", "twin", "victre"))
+HEADERS.add("ViewPosition of the other view", other_view, bases=("nifti", "both", "twin", "victre"))
 HEADERS.add("view code of the other view alone", partial(other_view, tag=False))
 HEADERS.add("PatientOrientation of rows reversed", partial(orientation, rows=True, columns=False))
 HEADERS.add("PatientOrientation of columns reversed", partial(orientation, rows=False, columns=True))

@@ -211,5 +211,7 @@ for _side, _share in (("lower", 0.5), ("left", 0.4), ("right", 0.4)):
     PICTURES.add(f"cut at the {_side} side", partial(cut, share=_share, side=_side), bases=("pictures",), times=2)
 for _change in (blank, noise, inverted, framed, labelled, striped, half_black, saturated, wrapped):
     PICTURES.add(_change.__name__.replace("_", " "), partial(spoiled, change=_change), times=1)
+for _name in ("half a turn", "mirrored", "upside down"):
+    PICTURES.add(f"real: {_name}, nothing says so", partial(turned, name=_name), bases=("twin", "victre"))
 PICTURES.add("framed", partial(spoiled, change=framed), bases=("both",))
 MUTATIONS = PICTURES.found

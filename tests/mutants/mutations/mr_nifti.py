@@ -12,7 +12,7 @@ from tests.mutants.case_folder import CaseFolder, Effect, edit_dicom, nifti_of, 
 from tests.mutants.mutations.registry import Mutations
 
 VOLUME = Mutations("MR volume", ("nifti",))
-_ALL = ("nifti", "both")
+_ALL = ("nifti", "both", "twin")
 
 
 def _columns(with_mask: bool) -> tuple[str, ...]:
@@ -218,6 +218,7 @@ for _factors in (
     (0.8, 0.8, 0.8),
 ):
     VOLUME.add(f"voxels times {_factors}", partial(spacing, factors=_factors))
+VOLUME.add("real: voxels times 1.2", partial(spacing, factors=(1.2, 1.2, 1.2)), bases=("twin",))
 VOLUME.add("voxels times 10, mask not", partial(spacing, factors=(10, 10, 10), with_mask=False))
 for _signs in ((-1, 1, 1), (1, -1, 1), (-1, -1, 1), (1, 1, -1)):
     VOLUME.add(f"affine times {_signs}", partial(mirrored_affine, signs=_signs), bases=_ALL)
@@ -247,7 +248,7 @@ for _change in (
     plane,
 ):
     VOLUME.add(_change.__name__.replace("_", " "), partial(samples, change=_change))
-VOLUME.add("the other side in the table", other_side, bases=("nifti", "pictures", "both"))
+VOLUME.add("the other side in the table", other_side, bases=("nifti", "pictures", "both", "twin", "victre"))
 for _name, _at, _form, _values in (
     ("no dimensions", 40, "<h", (0,)),
     ("seven dimensions", 40, "<h", (7,)),
