@@ -19,6 +19,7 @@ from stages.engine.artefact import Fields
 from stages.engine.completion import first_failure
 from stages.engine.contract import Failure, Inputs, SettingsModel, Stage, Subject, Value
 from stages.evaluate.fit import Limits, fit_rows
+from stages.evaluate.mark_doubts import mark_doubts
 from stages.evaluate.mechanical_doubts import MechanicalLimits
 from stages.evaluate.places import (
     landmark_rows_in_compressed,
@@ -43,6 +44,12 @@ class Settings(SettingsModel):
 
     outline_p95_limit_mm: float = Field(5.0, gt=0, description="95th percentile of the outline's misfit, mm")
     beam_gap_limit_mm: float = Field(10.0, gt=0, description="gap of the beams to a lesion seen in two views, mm")
+    mark_gap_limit_mm: float = Field(
+        10.0,
+        gt=0,
+        description="distance of a lesion marked on one side from where its mark on the other side leads, mm "
+        "(chosen: sound cases have up to 7)",
+    )
     min_det_f_limit: float = Field(0.2, ge=0, le=1, description="smallest volume ratio in the deformed mesh")
     penetration_limit: float = Field(
         0.05,
@@ -73,6 +80,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     found = _against_truth(inputs, Predictions(inputs.artefact("localize")))
     if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
         found.view_rows, found.elongation_rows = _per_view(inputs, settings, subject)
+        _add_mark_doubts(found, settings.mark_gap_limit_mm)
     return replace(found.fields(), failure=first_failure(artefacts))
 
 
@@ -148,9 +156,15 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
     of_volume = SegmentRecord(inputs.artefact("segment")).doubts
     for row in fits:
         row["trust"] = "; ".join(filter(None, [row["trust"], *of_volume]))
-    for row in (row for row in fits if row["trust"]):
-        print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
     return fits, elongations
+
+
+def _add_mark_doubts(found: EvaluateFields, limit_mm: float) -> None:
+    for row in found.view_rows:
+        doubts = mark_doubts(row["view"], row["method"], found.table_5_rows, found.table_6_rows, limit_mm)
+        row["trust"] = "; ".join(filter(None, [row["trust"], *doubts]))
+        if row["trust"]:
+            print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
 
 
 def _landmark_doubts(inputs: Inputs, pose: PoseRecord) -> list[str]:
