@@ -13,6 +13,7 @@ from mammoreg.pose.row_order import ORDER_ASSUMED
 from mammoreg.pose.thickness import ThicknessEstimate
 from stages.engine.artefact import write_artefact
 from stages.mesh.record import mesh_fields
+from stages.pose.record import PoseRecord
 from stages.pose.stage import THICKNESS_AT_BOUND
 from tests.stages.pressed_case import ANGLE, EDGE, GAP, MESH, MIDDLE, ROW, pressed, run, write_mammogram, write_start
 from tests.stages.synthetic_case import header
@@ -39,6 +40,7 @@ def test_pose_is_near_the_truth(found):
     assert found.value("height_mm") == pytest.approx(pressed().view.height_mm, abs=1.0)
     assert found.value("thickness_mm") == GAP
     assert found.value("coarse_rms_mm") < 0.6
+    assert 0.1 < PoseRecord(found).outline_step < 1.5
 
 
 def test_only_what_nobody_gave_is_marked_as_estimated(found):

@@ -98,7 +98,8 @@ class ViewRow(Row):
     orientation: str | None = Field(
         None,
         pattern=r"^[APRLHF]{1,3}\\[APRLHF]{1,3}$",
-        description=r"row and column direction as stored, such as A\R, P\L, A\FR or P\FL",
+        description=r"row and column direction as stored, such as A\R, P\L, A\FR or P\FL; where it is not known, "
+        "the pose takes the order of rows that fits, and asks where neither does",
     )
     exclude: str | None = _EXCLUDE
 
