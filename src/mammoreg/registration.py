@@ -52,6 +52,8 @@ class Breast:
         mask: the breast in front of the chest wall, breast frame.
         nipple: (3,), breast frame, mm.
         mesh: hexahedra, breast frame.
+        back_layer_mm: soft tissue between its back and the pectoral muscle, for `BreastMechanics`; None where it does
+            not show.
     """
 
     laterality: Laterality
@@ -59,6 +61,7 @@ class Breast:
     mask: Volume
     nipple: Points
     mesh: BlockMesh
+    back_layer_mm: float | None = None
 
     @classmethod
     def of_mr(
@@ -91,7 +94,8 @@ class Breast:
         found = segment_volume(mr.to_breast(laterality), given, settings, bias_field)
         mask = found.mr.with_data(found.breast.astype(np.uint8))
         mesh = build_mesh(mask, found.back, found.nipple, elements).mesh
-        return cls(laterality, found.mr.with_data(found.labels), mask, found.nipple, mesh)
+        labelled = found.mr.with_data(found.labels)
+        return cls(laterality, labelled, mask, found.nipple, mesh, found.muscle.layer_mm)
 
     @cached_property
     def reference(self) -> ReferenceMesh:

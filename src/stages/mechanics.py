@@ -1,5 +1,7 @@
 """Section `mechanics` of the configuration, the face of `BreastMechanics`, and what of it each stage reads."""
 
+from typing import Literal, Self
+
 from pydantic import Field
 
 from mammoreg.breast.mechanics import BreastMechanics, GravityName
@@ -112,11 +114,18 @@ class CoarseMechanics(SharedSettings):
             "chosen: the back may slide along the chest wall, not leave it, as in Garcia et al.'s published code"
         ),
     )
+    back_layer: Literal["measured", "constant"] = Field(
+        "constant",
+        description="the layer behind the model's back: always back_layer_mm, or measured in the MR volume where the "
+        "pectoral muscle shows",
+        json_schema_extra=source("chosen: what the measured one changes was tried on few breasts only"),
+    )
     back_layer_mm: float = Field(
         _DEFAULTS.back_layer_mm,
         gt=0.0,
         le=1000.0,
-        description="soft tissue between the model's back and the chest wall, which shears as the back slides, mm",
+        description="soft tissue between the model's back and the chest wall, which shears as the back slides, where "
+        "it is not measured, mm",
         json_schema_extra=source("chosen: some centimetres of soft tissue; no source"),
     )
     gravity: GravityName = Field(
@@ -136,7 +145,13 @@ class CoarseMechanics(SharedSettings):
     def numerics(self) -> BreastMechanics:
         """The same for `mammoreg`; a breast whose tissues are not told is homogeneous and has no skin of its own."""
         alike = {"material": "homogeneous", "gland_contrast": 1.0, "skin": "none"}
-        return BreastMechanics(**{**alike, **dict(self)})
+        told = {name: value for name, value in dict(self).items() if name != "back_layer"}
+        return BreastMechanics(**{**alike, **told})
+
+    def of_patient(self, layer_mm: float | None) -> Self:
+        """The same with the layer behind the back as it was measured; None: it does not show."""
+        measured = self.back_layer == "measured" and layer_mm is not None
+        return self.model_copy(update={"back_layer_mm": layer_mm}) if measured else self
 
 
 class Mechanics(CoarseMechanics, _TissueAndSkin):

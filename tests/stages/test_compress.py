@@ -132,6 +132,17 @@ def test_fibres_along_the_nipple_axis_shorten_the_reach(inputs, tmp_path):
     assert width[stiff] > width[plain], "the tissue goes sideways instead"
 
 
+@pytest.mark.parametrize(("layer", "acts_mm"), [("measured", 15.0), ("constant", 60.0)])
+def test_layer_behind_the_back_is_the_patient_s_own_where_it_was_measured(inputs, tmp_path, layer, acts_mm):
+    fields = segment_fields({}, MESH.points, MESH.points[0], "R", {"back_layer_mm": 15.0})
+    write_artefact(tmp_path / "measured.h5", header("segment", "R"), fields)
+    told = inputs | {"segment": tmp_path / "measured.h5"}
+    got = _with(told, tmp_path, back_layer=layer, back_layer_mm=60.0)
+    alike = _with(inputs, tmp_path, back_layer_mm=acts_mm)
+    np.testing.assert_array_equal(_nodes(got), _nodes(alike))
+    assert CompressRecord(got).mechanics.back_layer_mm == acts_mm
+
+
 def test_stiffer_gland_keeps_the_mean_stiffness_but_moves_the_nodes(inputs, segment, plain, tmp_path):
     contrasted = _with(inputs | {"segment": segment}, tmp_path, material="fat_and_gland", gland_contrast=6.0)
     assert contrasted.value("force_n") == pytest.approx(plain.value("force_n"), rel=0.35)

@@ -29,6 +29,7 @@ class Range:
 
 VOLUME, SKIN, GLAND, ROUGH = "breast_volume", "skin_thickness", "gland_share", "rough_skin"
 CONTRAST, DARK, CUT, HEIGHTS = "skin_contrast", "dark_inside", "cut_by_volume", "height_of_other_breast"
+MUSCLE = "muscle_behind_back"
 
 RANGES: Mapping[str, Range] = {
     VOLUME: Range(
@@ -88,6 +89,11 @@ RANGES: Mapping[str, Range] = {
         low=0.5,
         high=2.0,
         source="chosen: breasts of one woman differ by less",
+    ),
+    MUSCLE: Range(
+        "distance from the model's back to the pectoral muscle",
+        "mm",
+        source="10 to 55 mm in nine of ten labelled breasts; told, not judged",
     ),
 }
 """By the name of the check."""

@@ -26,7 +26,10 @@ def breast_mask(body: Bools, grid: Volume, back: BackSurface, apex: Points) -> B
     front = body & ahead
     thick = _piece_near(_opened(front, grid.spacing, OPENING_MM), grid, apex)
     halfway = apex[1] + 0.5 * float(back.posterior(apex[0], apex[2]) - apex[1])
-    fine = _opened(front, grid.spacing, NIPPLE_MM) & (p < halfway)[None, :, None]
+    # What lies two balls behind cannot matter to the front half.
+    near = int(np.searchsorted(p, halfway + 2.0 * NIPPLE_MM + 2.0 * grid.spacing[1]))
+    fine = np.zeros_like(front)
+    fine[:, :near] = _opened(front[:, :near], grid.spacing, NIPPLE_MM) & (p[:near] < halfway)[None, :, None]
     with_rim = ndimage.binary_dilation(thick, iterations=3, mask=front)
     with_nipple = ndimage.binary_dilation(with_rim, iterations=4, mask=with_rim | fine)
     return _smooth_skin(with_nipple, ahead)
@@ -64,5 +67,12 @@ def back_points(breast: Bools, grid: Volume, back: BackSurface, step_mm: float =
 
 def _opened(mask: Bools, spacing: NDArray[np.float64], radius_mm: float) -> Bools:
     """Union of the balls of a radius that fit into a mask; the grid's faces do not bound it."""
-    centres = ndimage.distance_transform_edt(mask, sampling=spacing) > radius_mm
-    return np.asarray(ndimage.distance_transform_edt(~centres, sampling=spacing) <= radius_mm)
+    opened = np.zeros_like(mask)
+    boxes = ndimage.find_objects(mask.astype(np.uint8))
+    if boxes:
+        # One voxel beyond the mask is enough to bound it: all that is further out is further away.
+        box = tuple(slice(max(s.start - 1, 0), s.stop + 1) for s in boxes[0])
+        centres = ndimage.distance_transform_edt(mask[box], sampling=spacing) > radius_mm
+        if centres.any():
+            opened[box] = ndimage.distance_transform_edt(~centres, sampling=spacing) <= radius_mm
+    return opened

@@ -12,6 +12,7 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging import anatomy
 from mammoreg.imaging.anatomy import FIELD_OF_VIEW, RANGES
+from mammoreg.imaging.mr_layer import MuscleFront
 from mammoreg.labels import Label
 
 SMOOTH_MM = 5.0
@@ -68,6 +69,7 @@ class Seen:
         labels: of the tissues.
         depth: below the skin, mm.
         fat_suppressed: whether fat is dark.
+        muscle: where the pectoral muscle begins.
         heights_mm: of this breast and of the other one above the midline; empty where both are not in view.
     """
 
@@ -78,6 +80,7 @@ class Seen:
     labels: NDArray[np.uint8]
     depth: NDArray[np.float32]
     fat_suppressed: bool
+    muscle: MuscleFront
     heights_mm: tuple[float, ...] = ()
 
 
@@ -130,6 +133,7 @@ def check_anatomy(seen: Seen) -> tuple[Check, ...]:
         Check(anatomy.DARK, _dark_share(seen)),
         Check(anatomy.CUT, _cut_share(seen, skin)),
         Check(anatomy.HEIGHTS, seen.heights_mm[1] / seen.heights_mm[0] if seen.heights_mm else None),
+        Check(anatomy.MUSCLE, seen.muscle.distance_mm if seen.muscle.shows else None),
     )
     wrong = [check for check in checks if check.refused]
     if wrong:

@@ -16,6 +16,7 @@ from mammoreg.imaging.mr_checks import Check, Seen, check_anatomy, check_field_o
 from mammoreg.imaging.mr_chest_wall import BackSettings, BackSurface, back_before_chest
 from mammoreg.imaging.mr_grid import Box, block_mean, nearest_labels, working_volume
 from mammoreg.imaging.mr_laterality import check_side
+from mammoreg.imaging.mr_layer import MuscleFront, muscle_front
 from mammoreg.imaging.mr_muscle import back_at_muscle
 from mammoreg.imaging.mr_nipple import find_nipple
 from mammoreg.imaging.mr_side import BreastPlace, find_breast
@@ -55,6 +56,7 @@ class Segmentation:
         back: points (N, 3) on that surface, mm.
         nipple: (3,), mm.
         fat_suppressed: whether fat is dark.
+        muscle: where the pectoral muscle begins behind the back.
         checks: measurements beside what is usual of a breast.
         side_doubt: what speaks against the side, in words; empty where nothing does.
     """
@@ -65,6 +67,7 @@ class Segmentation:
     back: Points
     nipple: Points
     fat_suppressed: bool
+    muscle: MuscleFront
     checks: tuple[Check, ...] = ()
     side_doubt: str = ""
 
@@ -91,20 +94,22 @@ def segment_volume(
     if given is not None:
         breast &= given != Label.MUSCLE
     box = _box_around(breast, int(MARGIN_MM / settings.spacing_mm))
+    whole, whole_body, whole_breast = grid, body, breast
     grid, body, breast = _crop(grid, box), body[box], breast[box]
+    points = back_points(breast, grid, back)
     corrected = grid.with_data(grid.data / bias_field(grid, breast))
     depth = depth_below_skin(body, grid.spacing)
     suppressed = is_fat_suppressed(corrected.data, depth, breast)
+    muscle = muscle_front(whole, whole_body, whole_breast, points, suppressed)
     if given is None:
         tissues = label_tissues(corrected, body, breast, depth, suppressed)
     else:
         tissues = np.where(body, np.where(given[box] == 0, Label.SKIN, given[box]), 0).astype(np.uint8)
     reach = float(back.posterior(place.apex[0], place.apex[2]) - place.apex[1])
     nipple = find_nipple(corrected, body, depth, suppressed, place.apex, reach)
-    seen = Seen(volume, corrected, body, breast, tissues, depth, suppressed, place.heights_mm)
+    seen = Seen(volume, corrected, body, breast, tissues, depth, suppressed, muscle, place.heights_mm)
     checks = check_anatomy(seen)
-    surface = back_points(breast, grid, back)
-    return Segmentation(corrected, tissues, breast, surface, nipple, suppressed, checks, doubt)
+    return Segmentation(corrected, tissues, breast, points, nipple, suppressed, muscle, checks, doubt)
 
 
 def segment_body(volume: Volume, spacing_mm: float) -> Volume:

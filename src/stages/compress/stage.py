@@ -15,6 +15,7 @@ from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject
 from stages.mechanics import Mechanics
 from stages.mesh.record import MeshRecord
 from stages.pose.record import PoseRecord
+from stages.segment.record import SegmentRecord
 from stages.solution import seconds_text
 
 
@@ -49,7 +50,9 @@ class Settings(SettingsModel):
 def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     """Close the plates to the thickness of the pose, or to its force."""
     pose, mesh = PoseRecord(inputs.artefact("pose")), MeshRecord(inputs.artefact("mesh"))
-    view, mechanics = pose.geometry, settings.mechanics.numerics()
+    layer_mm = SegmentRecord(inputs.artefact("segment")).back_layer_mm if inputs.has("segment") else None
+    patient = settings.mechanics.of_patient(layer_mm)
+    view, mechanics = pose.geometry, patient.numerics()
     mu_kpa = CalibrateRecord(inputs.artefact("calibrate")).mu_kpa
     gland = gland_share(inputs) if mechanics.tells_gland_from_fat else None
     options = replace(
@@ -64,7 +67,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     closing = prepared.closing
     closed = closing.close_to_force(_force_n(pose)) if by_force else closing.close(view.thickness_mm)
     print(seconds_text(closed.report), flush=True)
-    return CompressFields(closed, prepared, view, mesh, settings.mechanics, mu_kpa, gland).fields()
+    return CompressFields(closed, prepared, view, mesh, patient, mu_kpa, gland).fields()
 
 
 def _force_n(pose: PoseRecord) -> float:

@@ -69,7 +69,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     find = partial(
         find_pose,
         mesh=mesh,
-        mechanics=settings.mechanics.numerics(),
+        mechanics=settings.mechanics.of_patient(segment.back_layer_mm).numerics(),
         mu_kpa=mu_kpa,
         tissue=dense_tissue(segment.labels, segment.breast_mask, mesh) if dense else None,
         search=PoseSearch(settings.angle_step_deg, settings.angle_bound_deg, settings.angle_sd_deg),

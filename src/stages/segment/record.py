@@ -88,6 +88,12 @@ class SegmentRecord(Record):
         return "compressed_mask" in self.artefact.volume_names()
 
     @property
+    def back_layer_mm(self) -> float | None:
+        """Soft tissue between the model's back and the muscle; None where the volume does not show it."""
+        layer = self._given("back_layer_mm")
+        return None if layer is None else float(layer)
+
+    @property
     def doubts(self) -> Sequence[str]:
         """What speaks against the segmentation, in words."""
         return list(self._given("warnings", []))
