@@ -89,6 +89,7 @@ def test_value_that_is_not_permitted_is_answered_in_the_user_s_words():
     [
         ("friction", 0.1, {"pose", "compress"}),
         ("back_layer_mm", 20.0, {"pose", "compress"}),
+        ("back_layer", "measured", {"pose", "compress"}),
         ("material", "homogeneous", {"compress"}),
         ("gland_contrast", 2.0, {"compress"}),
         ("skin", "attached", {"compress"}),
@@ -143,7 +144,7 @@ def test_every_default_of_the_mechanics_says_where_it_comes_from():
     """In config.yaml and in the table of config/README.md: a reference, the paper, or the word chosen."""
     table = _table_of_sources()
     keys = type(config_model()().mechanics).model_fields
-    assert len(keys) == 15
+    assert len(keys) == 16
     for key in keys:
         value, origin = table[f"mechanics.{key}"]
         assert yaml.safe_load(value) == stage_settings(config_model()(), "compress")["mechanics"][key]

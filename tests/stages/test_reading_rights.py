@@ -5,8 +5,9 @@ import pytest
 from stages.cohort.cases import CaseRow, ViewRow
 from stages.engine.contract import Subject
 from stages.engine.errors import UserError
-from stages.engine.registry import CASE_STAGES, VIEW_STAGES, load_stage
+from stages.engine.registry import CASE_STAGES, STAGE_MODULES, VIEW_STAGES, load_stage
 from stages.engine.run import run_stage
+from stages.views import IMAGED
 from tests.stages.synthetic_case import write_case
 
 MARKS = {"mr_lesion", "mr_landmarks", "mr_compressed_landmarks", "mr_surface_points", "mr_compressed_surface_points"}
@@ -37,6 +38,10 @@ def test_pixels_and_intensities_are_read_once():
     assert readers["mr_compressed"] == ["segment"], "nothing after segment reads the second volume's intensities"
     assert readers["mr_labels"] == ["segment"]
     assert readers["image"] == ["pose"]
+    imaged = {f"image_{view}" for view in IMAGED}
+    takers = [stage for stage in STAGE_MODULES if imaged & {*load_stage(stage).inputs, *load_stage(stage).optional}]
+    assert takers[0] == "segment", "which asks how deep a breast they show"
+    assert not set(takers) & {"mesh", "compress", "shape", "solve", "project", "localize", "evaluate"}
     assert "segment" in readers["mr"]
     assert not set(readers["mr"]) & {"compress", "shape", "solve", "localize"}
 

@@ -9,6 +9,7 @@ import nibabel
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 from pydicom import dcmread
 
 from mammoreg.errors import DataError
@@ -27,6 +28,7 @@ from tests.stages.mr_series import series
 from tests.stages.mr_series import write as write_slices
 from tests.stages.synthetic_case import header
 from tests.stages.xarray_volumes import check_volumes
+from tests.unit.mammogram_images import breast_image
 from tests.unit.torso_phantom import RIGHT, torso
 
 SETTINGS = Settings(spacing_mm=2.0)
@@ -91,6 +93,36 @@ def test_a_volume_that_ends_within_the_breast_is_doubted(tmp_path: Path) -> None
     cut = rows["part"]["cut_by_volume"]
     assert cut["value"] > cut["high"]
     assert "end of the volume" in cut["doubt"]
+
+
+@pytest.fixture(scope="module")
+def imaged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A volume, and a picture whose breast is 280 pixels deep, mirrored from how a right CC is usually stored."""
+    folder = tmp_path_factory.mktemp("imaged")
+    Image.fromarray(np.clip(breast_image(), 0.0, 65535.0).astype(np.uint16)).save(folder / "cc.png")
+    return {"mr": write(torso(), folder / "mr.nii"), "image_CC": folder / "cc.png"}
+
+
+def test_a_long_breast_is_modelled_as_deep_as_its_mammograms_show(imaged: dict[str, Path]) -> None:
+    found = {}
+    for pixel_mm in (None, 0.16, 0.14, 0.02):
+        row = {"orientation_CC": "A\\L", "pixel_spacing_mm_CC": str(pixel_mm)}
+        files = {name: path for name, path in imaged.items() if pixel_mm or name == "mr"}
+        found[pixel_mm] = run(Inputs(files=files), SETTINGS, Subject("a", "R", row=row))
+    back = {size: float(np.max(fields.arrays["chest_wall_surface"].data[:, 1])) for size, fields in found.items()}
+    assert found[None].values["imaged_mm"] is None
+    assert found[0.16].values["imaged_mm"] == pytest.approx(280 * 0.16, abs=1.0)
+    assert back[0.16] - back[0.14] == pytest.approx(280 * 0.02, abs=0.5)
+    assert back[None] > back[0.16] + 2.0
+    assert back[0.02] == back[None], "a picture of another scale, or of a part, tells nothing"
+
+
+def test_a_mammogram_that_cannot_be_read_is_no_matter_of_the_segmentation(
+    imaged: dict[str, Path], tmp_path: Path
+) -> None:
+    (tmp_path / "cc.dcm").write_bytes(b"no DICOM")
+    alone, beside = segment({"mr": imaged["mr"]}), segment({"mr": imaged["mr"], "image_CC": tmp_path / "cc.dcm"})
+    assert np.array_equal(alone.arrays["chest_wall_surface"].data, beside.arrays["chest_wall_surface"].data)
 
 
 def test_labels_on_another_grid_are_refused(tmp_path: Path) -> None:

@@ -185,7 +185,20 @@ def subject_of(wildcards):
     row = case_row(case)
     mammogram = COHORT.mammograms.get((case, view))
     values = row.values() | (mammogram.values() if mammogram else {})
+    if view is None:
+        values |= picture_values(case)
     return {"case": case, "laterality": row.laterality, "view": view, "row": values}
+
+
+def picture_values(case):
+    """What the table says of how to read the mammograms of a case, by column and view."""
+    return {
+        f"{column}_{view}": text
+        for (owner, view), row in COHORT.mammograms.items()
+        if owner == case
+        for column, text in row.values().items()
+        if column in ("pixel_spacing_mm", "orientation")
+    }
 
 
 def settings_of(stage):

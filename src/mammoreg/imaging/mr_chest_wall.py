@@ -10,6 +10,8 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_corners import base_corners
 
+LEAST_IMAGED = 0.6  # chosen: mammograms that need less of the depth than this do not show the whole breast
+
 
 @dataclass(frozen=True)
 class BackSettings:
@@ -17,7 +19,8 @@ class BackSettings:
 
     Attributes:
         forward_share: how far it lies in front of the corners between breast and chest, share of their depth.
-        max_depth_mm: greatest depth below the apex; a mammogram shows no more of a long breast.
+        imaged_mm: how far mammograms show the breast before their chest-wall edge; inf: unknown.
+        behind_edge_mm: how much further back it is modelled.
         min_depth_mm: a breast that stands out less is refused.
         default_tilt, max_tilt: dp/d(-m), mm per mm, where no lateral corner is found, and at most.
         upper_bend, lower_bend: share of the half height over which it bends forward.
@@ -25,7 +28,8 @@ class BackSettings:
     """
 
     forward_share: float = 0.05
-    max_depth_mm: float = 120.0
+    imaged_mm: float = np.inf
+    behind_edge_mm: float = 20.0  # chosen: what the plates' lips press and draw in
     min_depth_mm: float = 20.0
     default_tilt: float = 0.15  # chosen: a back without a lateral corner leans as a rounded chest does
     max_tilt: float = 0.25  # chosen: a steeper lateral corner belongs to the arm
@@ -90,7 +94,7 @@ def back_before_chest(body: Volume, apex: Floats, settings: BackSettings) -> Bac
     slope = settings.default_tilt if lateral is None else (medial[1] - lateral[1]) / (lateral[0] - medial[0])
     tilt = -float(np.clip(slope, 0.0, settings.max_tilt))
     base = min(corner[1] - tilt * (corner[0] - apex[0]) for corner in (lateral, medial) if corner is not None)
-    depth = min((1.0 - settings.forward_share) * float(base - apex[1]), settings.max_depth_mm)
+    depth = _modelled_depth((1.0 - settings.forward_share) * float(base - apex[1]), settings)
     if depth < settings.min_depth_mm:
         raise DataError(f"the breast stands only {depth:.0f} mm out from the chest: check side and field of view")
     low, high = _half_depth_extent(body, apex, float(apex[1]) + 0.5 * depth, tilt)
@@ -99,6 +103,15 @@ def back_before_chest(body: Volume, apex: Floats, settings: BackSettings) -> Bac
     lower = Bend(low + settings.lower_bend * half, low, settings.lower_rise * depth)
     coefficients = np.array([apex[1] + depth, tilt, 0.0, 0.0, 0.0])
     return BackSurface(np.array([apex[0], 0.5 * (low + high)]), coefficients, (upper, lower))
+
+
+def _modelled_depth(whole: float, settings: BackSettings) -> float:
+    """Depth of the model below the apex, mm: to the chest, of a long breast no deeper than mammograms need.
+
+    A mammogram that shows too little of the breast tells of a part of it, or has another scale.
+    """
+    needed = settings.imaged_mm + settings.behind_edge_mm
+    return whole if needed < LEAST_IMAGED * whole else min(whole, needed)
 
 
 def _half_depth_extent(body: Volume, apex: Floats, p: float, tilt: float) -> tuple[float, float]:

@@ -12,7 +12,9 @@ from stages.bias import n4_field
 from stages.cohort.readers.mr import mr_choice, read_labels, read_mr
 from stages.cohort.readers.mr_choice import MrChoice
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
+from stages.segment.imaged import imaged_mm
 from stages.segment.record import check_row, segment_fields
+from stages.views import IMAGED
 
 _SAME_PLACE_MM = 0.1
 _DEFAULTS = SegmentSettings()
@@ -35,12 +37,13 @@ class Settings(SettingsModel):
         description="back in front of the corners between breast and chest, share of their depth",
         json_schema_extra=source("chosen: the corner itself belongs to the chest"),
     )
-    max_depth_mm: float = Field(
-        _DEFAULTS.back.max_depth_mm,
-        ge=40.0,
-        le=250.0,
-        description="greatest depth of the model below the apex, mm",
-        json_schema_extra=source("chosen: a mammogram shows no more of a long breast"),
+    behind_edge_mm: float = Field(
+        _DEFAULTS.back.behind_edge_mm,
+        ge=0.0,
+        le=200.0,
+        description="how much further back than the case's mammograms show it a long breast is modelled, mm; without "
+        "mammograms it is modelled to the chest",
+        json_schema_extra=source("chosen: what the plates' lips press and draw in"),
     )
     min_depth_mm: float = Field(
         _DEFAULTS.back.min_depth_mm,
@@ -57,19 +60,21 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     assert mr_path is not None
     side = subject.laterality
     series = subject.row.get("mr_series", "")
+    shown_mm = imaged_mm(inputs, subject)
     mr, choice = read_mr(mr_path, side, series), mr_choice(mr_path, side, series)
     labels = None if labels_path is None else read_labels(labels_path)
     if labels is not None and not _same_grid(mr, labels):
         raise DataError("mr_labels lies on another grid than mr; resample it onto the MR grid")
-    choices = SegmentSettings(settings.spacing_mm, _back_settings(settings))
+    choices = SegmentSettings(settings.spacing_mm, _back_settings(settings, shown_mm))
     breast_labels = None if labels is None else labels.to_breast(side)
-    found = segment_volume(mr.to_breast(side), breast_labels, choices, n4_field)
+    mr = mr.to_breast(side)  # a mirrored volume takes the place of the one that was read
+    found = segment_volume(mr, breast_labels, choices, n4_field)
     volumes = {
         "mr": found.mr,
         "labels": found.mr.with_data(found.labels),
         "breast_mask": found.mr.with_data(found.breast.astype(np.uint8)),
     }
-    values = _values(found) | _choice_values("mr", choice)
+    values = _values(found) | {"imaged_mm": _rounded(shown_mm, 2)} | _choice_values("mr", choice)
     if compressed_path is not None:
         values |= _choice_values("mr_compressed", mr_choice(compressed_path, side))
         second = read_mr(compressed_path, side).to_breast(side)
@@ -77,9 +82,12 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     return segment_fields(volumes, found.back, found.nipple, side, values)
 
 
-def _back_settings(settings: Settings) -> BackSettings:
+def _back_settings(settings: Settings, shown_mm: float | None) -> BackSettings:
     return BackSettings(
-        forward_share=settings.forward_share, max_depth_mm=settings.max_depth_mm, min_depth_mm=settings.min_depth_mm
+        forward_share=settings.forward_share,
+        imaged_mm=np.inf if shown_mm is None else shown_mm,
+        behind_edge_mm=settings.behind_edge_mm,
+        min_depth_mm=settings.min_depth_mm,
     )
 
 
@@ -97,9 +105,17 @@ def _values(found: Segmentation) -> dict[str, Value]:
         "fat_suppressed": found.fat_suppressed,
         "breast_volume_ml": round(float(found.breast.sum()) * found.mr.voxel_mm3 / 1000.0, 3),
         "gland_share": round(float((found.labels[found.breast] == Label.GLAND).mean()), 4),
+        "back_layer_mm": _rounded(found.muscle.layer_mm, 2),
+        "muscle_distance_mm": round(found.muscle.distance_mm, 2),
+        "muscle_step": round(found.muscle.step, 3),
+        "muscle_shown_share": round(found.muscle.shown_share, 3),
         "checks": [check_row(check) for check in found.checks],
         "warnings": [doubt for doubt in (found.side_doubt, *(check.doubt for check in found.checks)) if doubt],
     }
+
+
+def _rounded(value: float | None, decimals: int) -> float | None:
+    return None if value is None else round(value, decimals)
 
 
 def _choice_values(column: str, choice: MrChoice | None) -> dict[str, Value]:
@@ -118,7 +134,7 @@ STAGE = Stage(
     name="segment",
     schema=1,
     inputs=("mr",),
-    optional=("mr_labels", "mr_compressed"),
+    optional=("mr_labels", "mr_compressed", *(f"image_{view}" for view in IMAGED)),
     settings=Settings,
     run=run,
 )
