@@ -103,18 +103,28 @@ def imaged(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return {"mr": write(torso(), folder / "mr.nii"), "image_CC": folder / "cc.png"}
 
 
+def behind_nipple(fields: Fields) -> float:
+    """Posterior coordinate of the back's point behind the phantom's nipple, mm."""
+    back = fields.arrays["chest_wall_surface"].data
+    return float(back[np.argmin(np.hypot(*(back - RIGHT.nipple_point())[:, [0, 2]].T)), 1])
+
+
 def test_a_long_breast_is_modelled_as_deep_as_its_mammograms_show(imaged: dict[str, Path]) -> None:
     found = {}
-    for pixel_mm in (None, 0.16, 0.14, 0.02):
+    settings = Settings(spacing_mm=2.0, long_mm=55.0)
+    for pixel_mm in (None, 0.16, 0.14, 0.1):
         row = {"orientation_CC": "A\\L", "pixel_spacing_mm_CC": str(pixel_mm)}
         files = {name: path for name, path in imaged.items() if pixel_mm or name == "mr"}
-        found[pixel_mm] = run(Inputs(files=files), SETTINGS, Subject("a", "R", row=row))
-    back = {size: float(np.max(fields.arrays["chest_wall_surface"].data[:, 1])) for size, fields in found.items()}
+        found[pixel_mm] = run(Inputs(files=files), settings, Subject("a", "R", row=row))
+    back = {size: behind_nipple(fields) for size, fields in found.items()}
     assert found[None].values["imaged_mm"] is None
     assert found[0.16].values["imaged_mm"] == pytest.approx(280 * 0.16, abs=1.0)
     assert back[0.16] - back[0.14] == pytest.approx(280 * 0.02, abs=0.5)
     assert back[None] > back[0.16] + 2.0
-    assert back[0.02] == back[None], "a picture of another scale, or of a part, tells nothing"
+    assert found[0.1].values["imaged_mm"] + 20.0 < 55.0
+    assert back[0.14] - back[0.1] == pytest.approx(280 * 0.14 + 20.0 - 55.0, abs=0.7), "it is cut no further"
+    usual = run(Inputs(files=imaged), SETTINGS, Subject("a", "R", row=row))
+    assert behind_nipple(usual) == back[None], "this one is not long"
 
 
 def test_a_mammogram_that_cannot_be_read_is_no_matter_of_the_segmentation(
@@ -160,16 +170,22 @@ def test_given_labels_are_used() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mr", "side", "suppressed", "nipple"),
+    ("mr", "side", "suppressed", "nipple", "depth_mm"),
     [
-        ("twins/mr/twin4.nii.gz", "R", True, (-84.0, -82.0, -18.0)),
-        ("mri/6f032d7b_t1_fs_pre.nii.gz", "R", True, (-52.0, -26.0, -36.0)),
-        ("mri/69b91dc2_t1_tse_dicom", "L", False, (75.0, -20.0, -6.0)),
+        ("twins/mr/twin4.nii.gz", "R", True, (-84.0, -82.0, -18.0), (140.0, 170.0)),
+        ("mri/6f032d7b_t1_fs_pre.nii.gz", "R", True, (-52.0, -26.0, -36.0), (60.0, 140.0)),
+        ("mri/69b91dc2_t1_tse_dicom", "L", False, (75.0, -20.0, -6.0), (60.0, 140.0)),
     ],
 )
 @requires_shared("twins")
 @requires_shared("mri")
-def test_real_breasts(mr: str, side: Literal["L", "R"], suppressed: bool, nipple: tuple[float, float, float]) -> None:
+def test_real_breasts(
+    mr: str,
+    side: Literal["L", "R"],
+    suppressed: bool,
+    nipple: tuple[float, float, float],
+    depth_mm: tuple[float, float],
+) -> None:
     """Contrast and nipple as a reader sees them; the nipples were read off the images."""
     fields = segment({"mr": DATA / mr}, side)
     breast = fields.volumes["breast_mask"].volume
@@ -179,7 +195,7 @@ def test_real_breasts(mr: str, side: Literal["L", "R"], suppressed: bool, nipple
     back = fields.arrays["chest_wall_surface"].data
     x, y, z = breast.centres(breast.data > 0).T
     assert np.all(x < 0.0) if side == "R" else np.all(x > 0.0)
-    assert 60.0 < back[:, 1].max() - y.min() < 140.0
+    assert depth_mm[0] < back[:, 1].max() - y.min() < depth_mm[1]
     assert 70.0 < z.max() - z.min() < 175.0
 
 

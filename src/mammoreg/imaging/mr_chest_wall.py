@@ -10,8 +10,6 @@ from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.mr_corners import base_corners
 
-LEAST_IMAGED = 0.6  # chosen: mammograms that need less of the depth than this do not show the whole breast
-
 
 @dataclass(frozen=True)
 class BackSettings:
@@ -19,8 +17,9 @@ class BackSettings:
 
     Attributes:
         forward_share: how far it lies in front of the corners between breast and chest, share of their depth.
+        long_mm: breasts up to this depth are modelled whole, whatever mammograms show.
         imaged_mm: how far mammograms show the breast before their chest-wall edge; inf: unknown.
-        behind_edge_mm: how much further back it is modelled.
+        behind_edge_mm: how much further back a longer one is modelled.
         min_depth_mm: a breast that stands out less is refused.
         default_tilt, max_tilt: dp/d(-m), mm per mm, where no lateral corner is found, and at most.
         upper_bend, lower_bend: share of the half height over which it bends forward.
@@ -28,6 +27,7 @@ class BackSettings:
     """
 
     forward_share: float = 0.05
+    long_mm: float = 120.0  # chosen: few breasts are deeper
     imaged_mm: float = np.inf
     behind_edge_mm: float = 20.0  # chosen: what the plates' lips press and draw in
     min_depth_mm: float = 20.0
@@ -106,12 +106,8 @@ def back_before_chest(body: Volume, apex: Floats, settings: BackSettings) -> Bac
 
 
 def _modelled_depth(whole: float, settings: BackSettings) -> float:
-    """Depth of the model below the apex, mm: to the chest, of a long breast no deeper than mammograms need.
-
-    A mammogram that shows too little of the breast tells of a part of it, or has another scale.
-    """
-    needed = settings.imaged_mm + settings.behind_edge_mm
-    return whole if needed < LEAST_IMAGED * whole else min(whole, needed)
+    """Depth of the model below the apex, mm: to the chest; of a long breast as deep as its mammograms need."""
+    return min(whole, max(settings.long_mm, settings.imaged_mm + settings.behind_edge_mm))
 
 
 def _half_depth_extent(body: Volume, apex: Floats, p: float, tilt: float) -> tuple[float, float]:

@@ -37,12 +37,19 @@ class Settings(SettingsModel):
         description="back in front of the corners between breast and chest, share of their depth",
         json_schema_extra=source("chosen: the corner itself belongs to the chest"),
     )
+    long_mm: float = Field(
+        _DEFAULTS.back.long_mm,
+        ge=40.0,
+        le=250.0,
+        description="breasts up to this depth below the apex are modelled whole, mm",
+        json_schema_extra=source("chosen: few breasts are deeper"),
+    )
     behind_edge_mm: float = Field(
         _DEFAULTS.back.behind_edge_mm,
         ge=0.0,
         le=200.0,
-        description="how much further back than the case's mammograms show it a long breast is modelled, mm; without "
-        "mammograms it is modelled to the chest",
+        description="how much further back than the case's mammograms show it a longer breast is modelled, mm; "
+        "without mammograms it is modelled to the chest",
         json_schema_extra=source("chosen: what the plates' lips press and draw in"),
     )
     min_depth_mm: float = Field(
@@ -85,6 +92,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
 def _back_settings(settings: Settings, shown_mm: float | None) -> BackSettings:
     return BackSettings(
         forward_share=settings.forward_share,
+        long_mm=settings.long_mm,
         imaged_mm=np.inf if shown_mm is None else shown_mm,
         behind_edge_mm=settings.behind_edge_mm,
         min_depth_mm=settings.min_depth_mm,
