@@ -22,6 +22,7 @@ from stages.engine.artefact import Artefact, write_artefact
 from stages.engine.contract import Fields, Inputs, Subject
 from stages.engine.run import run_stage
 from stages.report.case import case_page
+from stages.segment.imaged import imaged_mm
 from stages.segment.stage import Settings, run
 from tests.shared_data import DATA, requires_shared
 from tests.stages.mr_series import series
@@ -125,6 +126,16 @@ def test_a_long_breast_is_modelled_as_deep_as_its_mammograms_show(imaged: dict[s
     assert back[0.14] - back[0.1] == pytest.approx(280 * 0.14 + 20.0 - 55.0, abs=0.7), "it is cut no further"
     usual = run(Inputs(files=imaged), SETTINGS, Subject("a", "R", row=row))
     assert behind_nipple(usual) == back[None], "this one is not long"
+
+
+def test_what_a_mammogram_shows_is_measured_in_the_middle_between_the_plates(imaged: dict[str, Path]) -> None:
+    row = {"orientation_CC": "A\\L", "pixel_spacing_mm_CC": "0.2", "source_detector_mm_CC": "660"}
+    files = Inputs(files={"image_CC": imaged["image_CC"]})
+    at_detector = imaged_mm(files, Subject("a", "R", row=row))
+    between = imaged_mm(files, Subject("a", "R", row=row | {"thickness_mm_CC": "60"}))
+    assert at_detector == pytest.approx(280 * 0.2, abs=1.0)
+    assert between == pytest.approx(at_detector * (660.0 - 15.0 - 30.0) / 660.0)
+    assert imaged_mm(Inputs(), Subject("a", "R")) is None
 
 
 def test_a_mammogram_that_cannot_be_read_is_no_matter_of_the_segmentation(

@@ -15,7 +15,9 @@ from stages.views import IMAGED
 
 
 def imaged_mm(inputs: Inputs, subject: Subject) -> float | None:
-    """Greatest distance at the detector, mm, from the chest-wall edge to the skin in a case's mammograms.
+    """Greatest distance, mm, from the chest-wall edge to the skin in a case's mammograms.
+
+    Measured in the middle between the plates where their distance is known, else at the detector.
 
     None where there is none that can be used; what is wrong with it `pose` tells.
     """
@@ -46,4 +48,8 @@ def _reach_mm(path: Path, row: dict[str, str], side: Laterality, view: View) -> 
         outline = analyse(image.pixels, facts.pixel_mm, view).outline
     except DataError:
         return None
-    return float(np.max(outline[:, 0]) + 0.5) * facts.pixel_mm
+    reach_mm = float(np.max(outline[:, 0]) + 0.5) * facts.pixel_mm
+    if facts.thickness_mm is None:
+        return reach_mm
+    middle_mm = facts.support_detector_mm + 0.5 * facts.thickness_mm
+    return reach_mm * (1.0 - middle_mm / facts.source_detector_mm)
