@@ -165,7 +165,8 @@ def _write_shared(folder: Path, cohort: str, case: str, drop: tuple[str, ...] = 
 
 
 def _only_cc(case: CaseFolder) -> CaseFolder:
-    del case.views["MLO"]
+    """Without the other view and the landmarks, whose predictions take time."""
+    del case.views["MLO"], case.case["mr_landmarks"]
     case.write_tables()
     return case
 

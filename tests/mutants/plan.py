@@ -56,9 +56,11 @@ _ANY = 4
 def quick_share(found: Sequence[Mutant]) -> list[Mutant]:
     """A fixed share of the mutants that end at `check` or run the last stages alone again, spread over the kinds."""
     cheap = (
-        lambda m: m.mutation.kind in ("marks", "tables"),
+        lambda m: m.mutation.kind in ("marks", "tables") and "for the MR volume" not in m.mutation.name,
         lambda m: m.mutation.kind == "damaged bytes" and "lesion" in m.mutation.name,
-        lambda m: m.mutation.kind == "mammogram header" and "no number" in m.mutation.name,
-        lambda m: m.mutation.kind == "harmless" and m.mutation.name.startswith(("table", "mask of 255")),
+        lambda m: (
+            m.mutation.kind == "mammogram header" and "no number" in m.mutation.name and "Angle" not in m.mutation.name
+        ),
+        lambda m: m.mutation.kind == "harmless" and m.mutation.name.startswith(("table", "mask of 255 ")),
     )
     return [m for m in found if any(test(m) for test in cheap) and zlib.crc32(m.name.encode()) % _ANY == 0]
