@@ -18,8 +18,8 @@ from mammoreg.localization.lesions import (
 )
 from mammoreg.localization.outside import distance_outside_px
 from mammoreg.metrics.distances import breast_scale_mm
-from stages.cohort.readers.masks import mask_names, read_image_mask, read_masks
-from stages.cohort.readers.points import MASK_NAME, is_list, read_discs, read_pixels, read_points, read_spheres
+from stages.cohort.readers.marks.masks import mask_names, read_image_mask, read_masks
+from stages.cohort.readers.marks.points import MASK_NAME, is_list, read_discs, read_pixels, read_points, read_spheres
 from stages.engine.contract import Inputs
 from stages.pose.record import PoseRecord
 

@@ -18,7 +18,7 @@ from mammoreg.phantom import anatomy, mammogram, warp
 from mammoreg.phantom.compression import Pressed
 from mammoreg.phantom.patient import ROLL_DEG, Patient
 from mammoreg.phantom.warp import Deformed
-from stages.cohort.readers.mr import read_mr
+from stages.cohort.readers.mr.volume import read_mr
 from stages.digital import stage as digital
 from stages.digital.dicom import mammogram_dicom, nifti, points_tsv, stored_mask
 from stages.digital.stage import Settings

@@ -12,7 +12,7 @@ from PIL import Image
 
 from mammoreg.geometry import breast_to_lps, lps_to_breast, plate_to_breast
 from mammoreg.geometry.frames import Laterality
-from stages.cohort.readers.points import read_points
+from stages.cohort.readers.marks.points import read_points
 from stages.engine.artefact import Artefact
 from stages.figures.exports import file_names
 from stages.formats.vtu import FRAME_FIELD

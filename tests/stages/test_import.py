@@ -13,8 +13,8 @@ from pydicom.uid import ImplicitVRLittleEndian, RLELossless, generate_uid
 
 from stages.cohort.cases import read_cohort
 from stages.cohort.preflight import check_cohort
-from stages.cohort.readers.mammogram import read_mammogram
-from stages.cohort.readers.mr import read_mr
+from stages.cohort.readers.mammogram.image import read_mammogram
+from stages.cohort.readers.mr.volume import read_mr
 from stages.command.main import main
 from tests.stages.cohort_files import COLUMNS, ROWS, write_dicom
 from tests.stages.mr_series import again, linear_field, report, series, write, write_directory

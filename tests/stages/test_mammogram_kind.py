@@ -6,7 +6,7 @@ from pydicom.dataset import Dataset
 from pydicom.tag import Tag
 
 from stages.cohort.readers.header_values import texts
-from stages.cohort.readers.mammogram_kind import lift_frame_values, other_kind
+from stages.cohort.readers.mammogram.kind import lift_frame_values, other_kind
 
 TOMOSYNTHESIS = "1.2.840.10008.5.1.4.1.1.13.1.3"
 PROJECTION = "1.2.840.10008.5.1.4.1.1.13.1.4"

@@ -10,8 +10,8 @@ from pydicom.dataset import Dataset
 
 from mammoreg.errors import DataError
 from stages.cohort.readers.header_values import number
-from stages.cohort.readers.mammogram_numbers import Numbers
-from stages.cohort.readers.projection_angle import projection_angle
+from stages.cohort.readers.mammogram.numbers import Numbers
+from stages.cohort.readers.mammogram.projection_angle import projection_angle
 
 
 def _numbers(row=None, **elements):

@@ -7,7 +7,7 @@ from pydicom.uid import ExplicitVRLittleEndian, generate_uid
 from skimage.io import imsave
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.mammogram import read_mammogram, read_mammogram_facts
+from stages.cohort.readers.mammogram.image import read_mammogram, read_mammogram_facts
 
 
 def _dicom(path, **changes):

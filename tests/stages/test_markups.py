@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.points import read_points, read_spheres, without_diameter
+from stages.cohort.readers.marks.points import read_points, read_spheres, without_diameter
 
 COLUMNS = "id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID"
 

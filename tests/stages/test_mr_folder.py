@@ -9,8 +9,8 @@ from pydicom.encaps import encapsulate
 from pydicom.uid import JPEG2000, JPEGLSLossless, RLELossless
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.mr import mr_choice, read_mr
-from stages.cohort.readers.mr_header import read_mr_grid
+from stages.cohort.readers.mr.header import read_mr_grid
+from stages.cohort.readers.mr.volume import mr_choice, read_mr
 from stages.cohort.readers.whole import check_whole_mr
 from tests.shared_data import DATA, requires_shared
 from tests.stages.mr_series import (

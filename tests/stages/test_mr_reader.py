@@ -15,8 +15,8 @@ from pydicom.uid import ExplicitVRLittleEndian, MRImageStorage, generate_uid
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume, volume_of_affine
-from stages.cohort.readers.mr import read_mr, read_nifti
-from stages.cohort.readers.mr_header import read_mr_grid
+from stages.cohort.readers.mr.header import read_mr_grid
+from stages.cohort.readers.mr.volume import read_mr, read_nifti
 from stages.cohort.readers.whole import check_whole_mr
 from tests.shared_data import DATA, requires_shared
 

@@ -5,7 +5,7 @@ import pytest
 from pydicom.dataset import Dataset
 
 from mammoreg.imaging.mammogram_canonical import canonicalise
-from stages.cohort.readers.outside import with_air_outside
+from stages.cohort.readers.mammogram.outside import with_air_outside
 from tests.unit.mammogram_images import breast_image
 
 RAW = {

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.masks import read_image_mask, read_masks
-from stages.cohort.readers.points import read_discs, read_pixels, read_points, read_spheres
+from stages.cohort.readers.marks.masks import read_image_mask, read_masks
+from stages.cohort.readers.marks.points import read_discs, read_pixels, read_points, read_spheres
 
 
 def picture(path: Path, pixels: np.ndarray) -> Path:

@@ -15,7 +15,7 @@ from pydicom import dcmread
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
 from mammoreg.imaging.anatomy import RANGES
-from stages.cohort.readers.mr import read_nifti
+from stages.cohort.readers.mr.volume import read_nifti
 from stages.cohort.series import series_token
 from stages.digital.dicom import mr_dicom
 from stages.engine.artefact import Artefact, write_artefact

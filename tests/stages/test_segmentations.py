@@ -12,8 +12,8 @@ from pydicom.sequence import Sequence
 from pydicom.uid import ExplicitVRLittleEndian
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.masks import mask_names, read_masks
-from stages.cohort.readers.points import is_list, read_spheres
+from stages.cohort.readers.marks.masks import mask_names, read_masks
+from stages.cohort.readers.marks.points import is_list, read_spheres
 
 ORIGIN = np.array([-20.0, -30.0, 5.0])
 SPACING = np.array([1.0, 1.5, 3.0])

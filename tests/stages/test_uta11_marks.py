@@ -12,7 +12,7 @@ from pydicom import dcmread
 
 from stages.cohort.cases import read_cohort
 from stages.cohort.preflight import check_cohort
-from stages.cohort.readers.points import read_discs, read_spheres
+from stages.cohort.readers.marks.points import read_discs, read_spheres
 from stages.command.main import main
 from tests.shared_data import DATA, requires_shared
 from tests.stages.mr_series import PIXEL_MM, series, write

@@ -6,8 +6,8 @@ from pydicom.datadict import dictionary_VR, tag_for_keyword
 from pydicom.dataelem import DataElement
 from pydicom.dataset import Dataset
 
-from stages.cohort.readers.view_codes import IMPLANT, PARTIAL, side_and_view
-from stages.cohort.readers.view_words import read_words
+from stages.cohort.readers.mammogram.view_codes import IMPLANT, PARTIAL, side_and_view
+from stages.cohort.readers.mammogram.view_words import read_words
 
 
 def _item(value, scheme="SRT", meaning=""):

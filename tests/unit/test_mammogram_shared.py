@@ -10,7 +10,7 @@ from skimage.io import imread, imsave
 from mammoreg.errors import DataError
 from mammoreg.imaging.mammogram import analyse
 from mammoreg.imaging.mammogram_canonical import canonicalise
-from stages.cohort.readers.mammogram import read_mammogram, read_mammogram_facts
+from stages.cohort.readers.mammogram.image import read_mammogram, read_mammogram_facts
 from tests.shared_data import DATA, requires_shared
 
 TWINS = [("twin1", "CC"), ("twin1", "MLO"), ("twin4", "CC"), ("twin4", "MLO")]

@@ -83,7 +83,7 @@ def test_the_segmentation_refuses_a_wrong_side() -> None:
 @requires_shared("twins")
 @pytest.mark.parametrize("name", ["twin1", "volunteer"])
 def test_single_breasts_of_the_twins(name: str) -> None:
-    from stages.cohort.readers.mr import read_mr
+    from stages.cohort.readers.mr.volume import read_mr
 
     volume = read_mr(DATA / "twins" / "mr" / f"{name}.nii.gz")
     assert told(volume, "R") == ""

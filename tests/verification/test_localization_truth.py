@@ -16,7 +16,7 @@ from mammoreg.localization.lesions import LesionArea, MaskLesion, area_from_mask
 from mammoreg.localization.to_mammogram import project_landmarks, project_lesion
 from mammoreg.localization.to_mr import MrPrediction, locate_in_breast
 from mammoreg.metrics.distances import detector_distance_mm
-from stages.cohort.readers.masks import read_image_mask, read_masks
+from stages.cohort.readers.marks.masks import read_image_mask, read_masks
 from tests.shared_data import DATA, requires_shared
 
 TWINS = DATA / "twins"

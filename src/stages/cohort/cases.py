@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from mammoreg.imaging.views import View
-from stages.cohort.readers.view_codes import registrable_view
+from stages.cohort.readers.mammogram.view_codes import registrable_view
 from stages.cohort.rows import Row, looks_like, read_rows
 from stages.cohort.series import series_token
 from stages.engine.errors import Fault, FaultsError

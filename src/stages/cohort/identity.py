@@ -6,8 +6,8 @@ from pathlib import Path
 from mammoreg.errors import DataError
 from stages.cohort.cases import Cohort
 from stages.cohort.readers import dicom_headers as dicom
-from stages.cohort.readers.mammogram import is_picture
-from stages.cohort.readers.mr import mr_choice
+from stages.cohort.readers.mammogram.image import is_picture
+from stages.cohort.readers.mr.volume import mr_choice
 
 _TAGS = ("SOPClassUID", "Modality", "PatientID", "PatientBirthDate")
 _PATIENTS = "the headers of mr and image name different patients"

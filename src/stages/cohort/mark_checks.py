@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.masks import read_image_mask, read_masks
-from stages.cohort.readers.mr_header import MrGrid, is_nifti, read_mr_grid
-from stages.cohort.readers.points import is_list, read_discs, read_pixels, read_points, read_spheres
+from stages.cohort.readers.marks.masks import read_image_mask, read_masks
+from stages.cohort.readers.marks.points import is_list, read_discs, read_pixels, read_points, read_spheres
+from stages.cohort.readers.mr.header import MrGrid, is_nifti, read_mr_grid
 
 BORDER_MM = 2.0
 """A mark may lie this far, or one voxel, beyond the outermost voxel centres."""

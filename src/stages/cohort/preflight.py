@@ -19,12 +19,12 @@ from stages.cohort.mark_checks import (
     check_view_landmarks,
     check_view_lesion,
 )
-from stages.cohort.readers.mammogram import image_size, is_picture, read_mammogram_facts
-from stages.cohort.readers.markups import UNKNOWN_DIAMETER_MM
-from stages.cohort.readers.mr import mr_choice, read_labels
-from stages.cohort.readers.mr_choice import MrChoice
-from stages.cohort.readers.mr_header import MrGrid, is_mr_dicom, is_nifti, read_mr_grid
-from stages.cohort.readers.points import is_list, without_diameter
+from stages.cohort.readers.mammogram.image import image_size, is_picture, read_mammogram_facts
+from stages.cohort.readers.marks.markups import UNKNOWN_DIAMETER_MM
+from stages.cohort.readers.marks.points import is_list, without_diameter
+from stages.cohort.readers.mr.choice import MrChoice
+from stages.cohort.readers.mr.header import MrGrid, is_mr_dicom, is_nifti, read_mr_grid
+from stages.cohort.readers.mr.volume import mr_choice, read_labels
 from stages.cohort.readers.whole import check_whole_dicom, check_whole_mr, check_whole_picture
 from stages.engine.errors import Fault
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mammoreg.geometry import Volume
 from mammoreg.geometry.frames import Laterality
-from stages.cohort.readers.mr_header import read_mr_grid
+from stages.cohort.readers.mr.header import read_mr_grid
 
 
 def mr_grid(path: Path, side: Laterality, series: str) -> tuple[tuple[int, ...], NDArray[np.float64]]:

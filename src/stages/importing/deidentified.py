@@ -5,7 +5,7 @@ import io
 from pydicom.dataset import Dataset, FileMetaDataset
 from pydicom.uid import generate_uid
 
-from stages.cohort.readers.mammogram_kind import other_kind
+from stages.cohort.readers.mammogram.kind import other_kind
 
 _GROUPS = (0x0018, 0x0028, 0x0054, 0x2050, 0x5200, 0x7FE0)
 """Acquisition, pixels, views, presentation, functional groups, samples."""

@@ -12,7 +12,7 @@ from pydicom.dataset import Dataset
 from mammoreg.errors import DataError
 from stages.cohort.readers import dicom_headers as dicom
 from stages.cohort.readers import header_values
-from stages.cohort.readers.mr_frames import TAGS, MrFrame, frames_of
+from stages.cohort.readers.mr.frames import TAGS, MrFrame, frames_of
 
 _IDENTITY = ("PatientName", "PatientBirthDate", "StudyDate", "ContentDate")
 MAMMOGRAMS = ("MG", "CR", "DX", "DR", "RG")

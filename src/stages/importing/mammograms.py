@@ -10,9 +10,9 @@ from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers import dicom_headers as dicom
 from stages.cohort.readers.header_values import text
-from stages.cohort.readers.mammogram import read_mammogram_facts
-from stages.cohort.readers.mammogram_kind import lift_frame_values, other_kind
-from stages.cohort.readers.view_codes import IMPLANT, PARTIAL, side_and_view
+from stages.cohort.readers.mammogram.image import read_mammogram_facts
+from stages.cohort.readers.mammogram.kind import lift_frame_values, other_kind
+from stages.cohort.readers.mammogram.view_codes import IMPLANT, PARTIAL, side_and_view
 from stages.cohort.readers.whole import check_whole_dicom
 
 RULE = (

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-from stages.cohort.readers.mr_choice import MrChoice, choose
-from stages.cohort.readers.mr_stacks import MrStack, stacks_of
+from stages.cohort.readers.mr.choice import MrChoice, choose
+from stages.cohort.readers.mr.stacks import MrStack, stacks_of
 from stages.importing.found import Found, Patient
 from stages.importing.mammograms import RULE, FoundImage, best_first, found_image
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from stages.cohort.readers.dicom_headers import read_dicom
-from stages.cohort.readers.mr_stacks import MrStack
-from stages.cohort.readers.mr_voxels import stack_voxels
+from stages.cohort.readers.mr.stacks import MrStack
+from stages.cohort.readers.mr.voxels import stack_voxels
 from stages.engine.errors import UserError
 from stages.formats.nifti import nifti_bytes
 from stages.importing.deidentified import deidentified

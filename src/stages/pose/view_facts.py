@@ -16,8 +16,8 @@ from mammoreg.pose.outlined import OUTLINE_RAYS, OutlinedMammogram, OutlinedView
 from mammoreg.pose.plates import find_plates
 from mammoreg.pose.second_volume import outline_of_mask, parallel_view
 from mammoreg.pose.silhouette import ray_angles
-from stages.cohort.readers.mammogram import read_mammogram
-from stages.cohort.readers.mammogram_header import MammogramFacts
+from stages.cohort.readers.mammogram.header import MammogramFacts
+from stages.cohort.readers.mammogram.image import read_mammogram
 from stages.engine.contract import Subject, Value
 from stages.pose.record import ImageOutline, ImageStorage
 

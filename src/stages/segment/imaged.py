@@ -9,7 +9,7 @@ from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mammogram import analyse
 from mammoreg.imaging.mammogram_canonical import canonicalise
 from mammoreg.imaging.views import View
-from stages.cohort.readers.mammogram import read_mammogram
+from stages.cohort.readers.mammogram.image import read_mammogram
 from stages.engine.contract import Inputs, Subject
 from stages.views import IMAGED
 

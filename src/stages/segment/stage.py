@@ -9,8 +9,8 @@ from mammoreg.imaging.mr_chest_wall import BackSettings
 from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_body, segment_volume
 from mammoreg.labels import Label
 from stages.bias import n4_field
-from stages.cohort.readers.mr import mr_choice, read_labels, read_mr
-from stages.cohort.readers.mr_choice import MrChoice
+from stages.cohort.readers.mr.choice import MrChoice
+from stages.cohort.readers.mr.volume import mr_choice, read_labels, read_mr
 from stages.engine.contract import Fields, Inputs, SettingsModel, Stage, Subject, Value, source
 from stages.segment.imaged import imaged_mm
 from stages.segment.record import check_row, segment_fields

@@ -10,10 +10,10 @@ from pydicom.dataset import Dataset
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers.dicom_headers import read_dicom
-from stages.cohort.readers.mr_folder import choose_mr
-from stages.cohort.readers.mr_header import is_mr_dicom, is_nifti
-from stages.cohort.readers.mr_voxels import stored_frames
-from stages.cohort.readers.nifti_header import load_nifti
+from stages.cohort.readers.mr.folder import choose_mr
+from stages.cohort.readers.mr.header import is_mr_dicom, is_nifti
+from stages.cohort.readers.mr.nifti_header import load_nifti
+from stages.cohort.readers.mr.voxels import stored_frames
 
 _CHUNK = 1 << 22
 

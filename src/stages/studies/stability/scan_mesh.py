@@ -8,7 +8,7 @@ from mammoreg.imaging.mr_segment import Segmentation, SegmentSettings, segment_v
 from mammoreg.meshing.breast import build_mesh
 from mammoreg.scenes.scenario import LEVELS
 from stages.bias import n4_field
-from stages.cohort.readers.mr import read_mr
+from stages.cohort.readers.mr.volume import read_mr
 from stages.engine.contract import Fields, Inputs, NoSettings, Stage, Subject
 from stages.studies.stability.record import scan_mesh_fields
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers.dicom_headers import read_dicom
-from stages.cohort.readers.mr_folder import choose_mr
-from stages.cohort.readers.mr_stacks import FEWEST_VOXELS
-from stages.cohort.readers.nifti_header import nifti_affine
+from stages.cohort.readers.mr.folder import choose_mr
+from stages.cohort.readers.mr.nifti_header import nifti_affine
+from stages.cohort.readers.mr.stacks import FEWEST_VOXELS
 
 NIFTI = (".nii", ".nii.gz")
 SPACING_MM = (0.1, 15.0)

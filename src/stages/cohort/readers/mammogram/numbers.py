@@ -8,7 +8,7 @@ from pydicom.dataset import Dataset
 from mammoreg.errors import DataError
 from mammoreg.imaging.views import View
 from stages.cohort.readers.header_values import number, quoted, texts
-from stages.cohort.readers.projection_angle import is_no_angle, projection_angle
+from stages.cohort.readers.mammogram.projection_angle import is_no_angle, projection_angle
 
 THICKNESS_MM = (10.0, 160.0)
 """Distances of the plates that a breast is pressed to (chosen: wider than any that is reported)."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
-from stages.cohort.readers.markups import ENDINGS, UNKNOWN_DIAMETER_MM, Mark, is_markups, read_marks
+from stages.cohort.readers.marks.markups import ENDINGS, UNKNOWN_DIAMETER_MM, Mark, is_markups, read_marks
 from stages.cohort.readers.table import TableError, read_table
 
 Vector = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stages.cohort.readers import dicom_headers as dicom
 from stages.cohort.readers import header_values
-from stages.cohort.readers.mr_frames import MrFrame
+from stages.cohort.readers.mr.frames import MrFrame
 
 FEWEST_VOXELS = 8
 """Fewer a side are no volume."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
-from stages.cohort.readers import mr_kind
-from stages.cohort.readers.mr_stacks import FEWEST_VOXELS, SLICE_TOLERANCE, MrStack
+from stages.cohort.readers.mr import kind as mr_kind
+from stages.cohort.readers.mr.stacks import FEWEST_VOXELS, SLICE_TOLERANCE, MrStack
 from stages.cohort.series import series_token
 
 _COVERS = 0.6

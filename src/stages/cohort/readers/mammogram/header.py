@@ -11,8 +11,8 @@ from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.mammogram_orientation import flips_of_orientation
 from mammoreg.imaging.views import PROJECTIONS, View
 from stages.cohort.readers.header_values import text, texts
-from stages.cohort.readers.mammogram_numbers import Numbers
-from stages.cohort.readers.view_codes import Said, is_direction_pair, side_and_view
+from stages.cohort.readers.mammogram.numbers import Numbers
+from stages.cohort.readers.mammogram.view_codes import Said, is_direction_pair, side_and_view
 
 DEFAULT_SOURCE_DETECTOR_MM = 650.0
 DEFAULT_SUPPORT_DETECTOR_MM = 15.0

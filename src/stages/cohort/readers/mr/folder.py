@@ -10,9 +10,9 @@ from pydicom.uid import EnhancedMRImageStorage, MRImageStorage
 from mammoreg.errors import DataError
 from mammoreg.geometry.frames import Laterality
 from stages.cohort.readers import dicom_headers as dicom
-from stages.cohort.readers.mr_choice import MrChoice, choose
-from stages.cohort.readers.mr_frames import TAGS, MrFrame, frames_of
-from stages.cohort.readers.mr_stacks import MrStack, stacks_of
+from stages.cohort.readers.mr.choice import MrChoice, choose
+from stages.cohort.readers.mr.frames import TAGS, MrFrame, frames_of
+from stages.cohort.readers.mr.stacks import MrStack, stacks_of
 
 _NIFTI = (".nii", ".nii.gz")
 _PICTURES = (MRImageStorage, EnhancedMRImageStorage)

@@ -2,7 +2,7 @@
 
 import re
 
-from stages.cohort.readers.mr_stacks import MrStack
+from stages.cohort.readers.mr.stacks import MrStack
 
 _NO_ANATOMY: dict[str, tuple[frozenset[str], frozenset[str]]] = {
     "localizer": (

@@ -14,8 +14,8 @@ from pydicom.dataset import Dataset
 from mammoreg.errors import DataError
 from stages.cohort.readers import dicom_headers as dicom
 from stages.cohort.readers import header_values
-from stages.cohort.readers.mr_frames import MrFrame
-from stages.cohort.readers.mr_stacks import MrStack
+from stages.cohort.readers.mr.frames import MrFrame
+from stages.cohort.readers.mr.stacks import MrStack
 
 _RESCALING = (
     "RescaleSlope",

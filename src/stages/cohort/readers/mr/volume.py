@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume, volume_of_affine
 from mammoreg.geometry.frames import Laterality
-from stages.cohort.readers.mr_choice import MrChoice
-from stages.cohort.readers.mr_folder import choose_mr
-from stages.cohort.readers.mr_header import is_mr_dicom, read_mr_grid
-from stages.cohort.readers.mr_voxels import stack_voxels
-from stages.cohort.readers.nifti_header import LPS_OF_RAS, load_nifti
+from stages.cohort.readers.mr.choice import MrChoice
+from stages.cohort.readers.mr.folder import choose_mr
+from stages.cohort.readers.mr.header import is_mr_dicom, read_mr_grid
+from stages.cohort.readers.mr.nifti_header import LPS_OF_RAS, load_nifti
+from stages.cohort.readers.mr.voxels import stack_voxels
 
 LABEL_ROUNDING = 1e-3
 """A header's scale factor may take labels off whole numbers by this much."""

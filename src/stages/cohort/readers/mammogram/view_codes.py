@@ -9,7 +9,7 @@ from pydicom.dataset import Dataset
 from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.views import VIEWS, View
 from stages.cohort.readers.header_values import items, number, quoted, text, texts
-from stages.cohort.readers.view_words import (
+from stages.cohort.readers.mammogram.view_words import (
     Side,
     in_words,
     modifiers_of_code,

@@ -15,9 +15,9 @@ from mammoreg.geometry.frames import Laterality
 from mammoreg.imaging.views import View
 from stages.cohort.readers.dicom_headers import read_dicom
 from stages.cohort.readers.header_values import number, texts
-from stages.cohort.readers.mammogram_header import MammogramFacts, mammogram_facts
-from stages.cohort.readers.mammogram_kind import lift_frame_values, other_kind
-from stages.cohort.readers.outside import with_air_outside
+from stages.cohort.readers.mammogram.header import MammogramFacts, mammogram_facts
+from stages.cohort.readers.mammogram.kind import lift_frame_values, other_kind
+from stages.cohort.readers.mammogram.outside import with_air_outside
 
 PICTURES = (".png", ".tif", ".tiff")
 EXTENT_MM = (40.0, 600.0)

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from mammoreg.errors import DataError
 from mammoreg.geometry import Volume
-from stages.cohort.readers.dicom_seg import read_dicom_seg
-from stages.cohort.readers.mr_header import is_nifti
-from stages.cohort.readers.nrrd_seg import is_nrrd, read_nrrd
-from stages.cohort.readers.points import MASK_NAME
+from stages.cohort.readers.marks.dicom_seg import read_dicom_seg
+from stages.cohort.readers.marks.nrrd_seg import is_nrrd, read_nrrd
+from stages.cohort.readers.marks.points import MASK_NAME
+from stages.cohort.readers.mr.header import is_nifti
 
 LARGEST_ML = 500.0
 """A ball of 98 mm; a larger mask is the breast's or the background's."""
@@ -56,7 +56,7 @@ def _chosen(segments: dict[str, Volume]) -> dict[str, Volume]:
 
 
 def _mask_on_mr_grid(path: Path) -> Volume:
-    from stages.cohort.readers.mr import read_nifti
+    from stages.cohort.readers.mr.volume import read_nifti
 
     volume = read_nifti(path)
     found = _lesion(str(path), volume)

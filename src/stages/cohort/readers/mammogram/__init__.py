@@ -1,0 +1,1 @@
+"""Mammograms: DICOM and pictures, with how they were taken."""

@@ -1,0 +1,1 @@
+"""Lesions and landmarks: tables, masks, DICOM SEG, 3D Slicer."""

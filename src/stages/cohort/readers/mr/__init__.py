@@ -1,0 +1,1 @@
+"""MR volumes: NIfTI files, and folders of DICOM as they come."""
