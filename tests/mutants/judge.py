@@ -59,13 +59,15 @@ def judge(outcome: Outcome, base: Outcome, effect: Effect, landmarks: bool = Fal
         return Verdict("hang", error_mm, outcome.message)
     if outcome.ended in ("check", "failed"):
         return Verdict("check" if outcome.ended == "check" else "stage", error_mm, outcome.message)
-    new = [flag for flag in flags_of(outcome) if _kind(flag) not in {_kind(old) for old in flags_of(base)}]
+    old = {_kind(flag) for flag in flags_of(base, landmarks)}
+    new = [flag for flag in flags_of(outcome, landmarks) if _kind(flag) not in old]
     return Verdict("trust" if new else "nothing", error_mm, "; ".join(new))
 
 
-def flags_of(outcome: Outcome) -> list[str]:
-    """Flags that tell a doubtful answer from a sound one, without the places that they speak of."""
-    texts = [flag.strip() for text in outcome.flags.values() for flag in text.split(";") if flag.strip()]
+def flags_of(outcome: Outcome, landmarks: bool = False) -> list[str]:
+    """Flags that tell a doubtful answer from a sound one: of views, of lesions, and of landmarks where they count."""
+    counted = [text for key, text in outcome.flags.items() if landmarks or " lesion" in key or " " not in key]
+    texts = [flag.strip() for text in counted for flag in text.split(";") if flag.strip()]
     usual = re.compile("|".join(USUAL))
     return [text for text in dict.fromkeys(texts) if not usual.search(text) and UNSEEN not in text]
 

@@ -56,6 +56,12 @@ def test_a_new_flag_catches_and_an_old_or_usual_one_does_not():
     assert judge(moved(flags={"CC": "force 250 N outside 49-186 N"}), BASE, Effect()).layer == "nothing"
 
 
+def test_a_flag_on_a_landmark_says_nothing_of_a_lesion():
+    stray = moved(flags={"CC P01": "marked in the air"})
+    assert judge(stray, BASE, Effect()).silent
+    assert not judge(stray, BASE, Effect(), landmarks=True).silent
+
+
 def test_a_bug_is_a_traceback_and_a_fault_is_not():
     assert judge(Outcome("bug", "stopped by a bug"), BASE, Effect()).broken
     assert judge(Outcome("traceback", "KeyError"), BASE, Effect()).broken
