@@ -146,6 +146,13 @@ def padding(case: CaseFolder, random: Generator) -> Effect:
     return edited(case, random, lambda d: d.add_new("PixelPaddingValue", "US", 2000), note="padding 2000")
 
 
+def leading_zero(case: CaseFolder, random: Generator) -> Effect:
+    def change(dataset: Any) -> None:
+        dataset.BodyPartThickness = f"0{dataset.BodyPartThickness}"
+
+    return edited(case, random, change, note="thickness with a leading zero")
+
+
 _DROPPED = (
     *("ViewPosition", "ImageLaterality", "PatientOrientation", "ImagerPixelSpacing", "BodyPartThickness"),
     *("PositionerPrimaryAngle", "DistanceSourceToDetector", "DistanceSourceToPatient", "Modality", "Rows"),
@@ -207,5 +214,6 @@ for _name, _values in {
 }.items():
     HEADERS.add(_name, partial(put, **_values), bases=("nifti",))
 HEADERS.add("padding that is breast", padding, bases=("nifti",))
-HEADERS.add("thickness as text", partial(put, BodyPartThickness="052"), bases=("nifti",), harmless=True)
+HEADERS.add("thickness with a leading zero", leading_zero, bases=("nifti",), harmless=True)
+HEADERS.add("thickness of another breast", partial(put, BodyPartThickness="52"), bases=("nifti",))
 MUTATIONS = HEADERS.found
