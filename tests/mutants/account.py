@@ -8,7 +8,7 @@ from pathlib import Path
 from tests.mutants.judge import SAME_MM, WRONG_MM, Judged, broken_demands, flags_of
 from tests.mutants.pipeline import Outcome
 
-LAYERS = ("check", "stage", "trust", "nothing", "traceback", "hang")
+LAYERS = ("check", "stage", "trust", "marks", "nothing", "traceback", "hang")
 COLUMNS = ("kind", "mutation", "base", "number", "harmless", "layer", "error_mm", "seconds", "note", "said")
 
 
@@ -31,7 +31,7 @@ def write_account(folder: Path, mutants: Sequence[Judged], bases: Mapping[str, O
 def summary(mutants: Sequence[Judged], bases: Mapping[str, Outcome]) -> str:
     """Counts by kind of mutation and by the layer that caught it, then what is not met."""
     lines = ["# Mutants", "", f"{len(mutants)} mutants of {len(bases)} cases. What each layer caught:", ""]
-    head = ("kind", "mutants", *LAYERS[:3], "nothing, same", "nothing, 1-5 mm", "nothing, beyond", *LAYERS[4:])
+    head = ("kind", "mutants", *LAYERS[:4], "nothing, same", "nothing, 1-5 mm", "nothing, beyond", *LAYERS[5:])
     lines += [_line(head), _line(["---", *["---:"] * (len(head) - 1)])]
     for harmless in (False, True):
         chosen = [m for m in mutants if m.harmless == harmless]
@@ -52,7 +52,7 @@ def _counts(label: str, mutants: Sequence[Judged]) -> str:
     beyond = sum(error > WRONG_MM for error in errors)
     between = sum(SAME_MM < error <= WRONG_MM for error in errors)
     quiet = (len(errors) - beyond - between, between, beyond)
-    return _line([label, len(mutants), *(by[x] for x in LAYERS[:3]), *quiet, *(by[x] for x in LAYERS[4:])])
+    return _line([label, len(mutants), *(by[x] for x in LAYERS[:4]), *quiet, *(by[x] for x in LAYERS[5:])])
 
 
 def _line(cells: Sequence[object]) -> str:

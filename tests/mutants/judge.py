@@ -17,7 +17,7 @@ UNFLAGGED_SHARE, ALARM_SHARE = 0.02, 0.05
 USUAL = ("angle not determined by the image", r"force \d+ N outside 49-186 N")
 UNSEEN = "outside the imaged part"
 
-Layer = Literal["check", "stage", "trust", "nothing", "traceback", "hang"]
+Layer = Literal["check", "stage", "trust", "marks", "nothing", "traceback", "hang"]
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,8 @@ class Verdict:
     """A mutant's end.
 
     Attributes:
-        layer: what caught it; `nothing` where an answer stands without a new flag.
+        layer: what caught it; `marks` where only the marks of both sides, which few users have, contradict each other;
+            `nothing` where an answer stands without a new flag.
         error_mm: largest distance of its answers from the unmutated ones; nan without answers, inf for a lost one.
         said: the fault, the failure or the new flags.
     """
@@ -61,6 +62,8 @@ def judge(outcome: Outcome, base: Outcome, effect: Effect, landmarks: bool = Fal
         return Verdict("check" if outcome.ended == "check" else "stage", error_mm, outcome.message)
     old = {_kind(flag) for flag in flags_of(base, landmarks)}
     new = [flag for flag in flags_of(outcome, landmarks) if _kind(flag) not in old]
+    if not new and outcome.marks_differ and not base.marks_differ:
+        return Verdict("marks", error_mm, "; ".join(outcome.marks_differ))
     return Verdict("trust" if new else "nothing", error_mm, "; ".join(new))
 
 

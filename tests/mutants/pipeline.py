@@ -39,6 +39,7 @@ class Outcome:
         ended: check, failed, ok, bug or traceback.
         message: faults, the first failure, or the traceback's end.
         flags: by view, `trust` of `updated` in views.csv, and what the predictions say against themselves.
+        marks_differ: what the marks of both sides say against each other.
         marks: by view or "MR", the places of lesions and landmarks; pixels as stored, or LPS mm.
         scale_mm: by view, mm in the breast per pixel of the stored picture.
         estimated: what neither header nor table gave, by view.
@@ -47,6 +48,7 @@ class Outcome:
     ended: str
     message: str = ""
     flags: dict[str, str] = field(default_factory=dict)
+    marks_differ: list[str] = field(default_factory=list)
     marks: dict[str, dict[str, list[float]]] = field(default_factory=dict)
     scale_mm: dict[str, float] = field(default_factory=dict)
     estimated: dict[str, str] = field(default_factory=dict)
@@ -195,6 +197,7 @@ def _outcome(made: dict[str, list[Artefact]]) -> Outcome:
     for pose in (PoseRecord(a) for a in made.get("pose", []) if a.ok):
         geometry = pose.geometry
         outcome.scale_mm[pose.view] = geometry.pixel_mm / geometry.middle_magnification
+    outcome.marks_differ = list(evaluate.value("warnings")) if evaluate.has("warnings") else []
     _note_marks(outcome, Predictions(localize))
     return outcome
 

@@ -4,27 +4,23 @@ from collections.abc import Sequence
 
 from stages.evaluate.record import Row
 
+_METHOD = "updated"
 
-def mark_doubts(
-    view: str, method: str, in_mammograms: Sequence[Row], in_mr: Sequence[Row], limit_mm: float
-) -> list[str]:
-    """What a view's marks say against a method's result, or its result against the marks, in words.
 
-    It looks at lesions that bear one name on both sides; predictions are made without it.
+def mark_doubts(in_mammograms: Sequence[Row], in_mr: Sequence[Row], limit_mm: float) -> list[str]:
+    """What the marks of both sides say against each other, in words.
+
+    It looks at lesions that bear one name on both sides, so it is no part of `trust`: that must not know the answer,
+    which most users do not have.
 
     Args:
-        view, method: of the result.
         in_mammograms, in_mr: rows of `table_5.csv` and `table_6.csv`; in MR only what several views determine counts.
         limit_mm: beyond this distance of marked from predicted place.
     """
-    rows = [row for row in in_mammograms if row["view"] == view]
-    rows += [row for row in in_mr if "+" in row["views"] and view in row["views"].split("+")]
-    far: dict[str, float] = {}
-    for row in rows:
-        distance_mm = row["distance_mm"]
-        if row["method"] == method and distance_mm is not None and distance_mm > limit_mm:
-            far[row["name"]] = max(distance_mm, far.get(row["name"], 0.0))
+    rows = [(row["view"], row) for row in in_mammograms] + [(row["views"], row) for row in in_mr if "+" in row["views"]]
     return [
-        f"{name} is marked {mm:.0f} mm from where the other side's mark leads: check that both mark one lesion"
-        for name, mm in far.items()
+        f"{place}: {row['name']} is marked {row['distance_mm']:.0f} mm from where the other side's mark leads: "
+        "check that both mark one lesion"
+        for place, row in rows
+        if row["method"] == _METHOD and row["distance_mm"] is not None and row["distance_mm"] > limit_mm
     ]

@@ -12,13 +12,14 @@ Row = dict[str, Any]
 
 @dataclass
 class EvaluateFields:
-    """Rows by table, without their column `case`."""
+    """Rows by table, without their column `case`, and what marks on both sides say against each other."""
 
     table_5_rows: list[Row] = field(default_factory=list)
     table_6_rows: list[Row] = field(default_factory=list)
     landmark_rows: list[Row] = field(default_factory=list)
     view_rows: list[Row] = field(default_factory=list)
     elongation_rows: list[Row] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
     def fields(self) -> Fields:
         """The artefact's contents."""

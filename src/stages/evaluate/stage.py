@@ -80,7 +80,7 @@ def run(inputs: Inputs, settings: Settings, subject: Subject) -> Fields:
     found = _against_truth(inputs, Predictions(inputs.artefact("localize")))
     if all(inputs.artefact(name).ok for name in ("segment", "mesh")):
         found.view_rows, found.elongation_rows = _per_view(inputs, settings, subject)
-        _add_mark_doubts(found, settings.mark_gap_limit_mm)
+        found.warnings = mark_doubts(found.table_5_rows, found.table_6_rows, settings.mark_gap_limit_mm)
     return replace(found.fields(), failure=first_failure(artefacts))
 
 
@@ -156,15 +156,9 @@ def _per_view(inputs: Inputs, settings: Settings, subject: Subject) -> tuple[lis
     of_volume = SegmentRecord(inputs.artefact("segment")).doubts
     for row in fits:
         row["trust"] = "; ".join(filter(None, [row["trust"], *of_volume]))
+    for row in (row for row in fits if row["trust"]):
+        print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
     return fits, elongations
-
-
-def _add_mark_doubts(found: EvaluateFields, limit_mm: float) -> None:
-    for row in found.view_rows:
-        doubts = mark_doubts(row["view"], row["method"], found.table_5_rows, found.table_6_rows, limit_mm)
-        row["trust"] = "; ".join(filter(None, [row["trust"], *doubts]))
-        if row["trust"]:
-            print(f"{row['view']} {row['method']}: {row['trust']}", flush=True)
 
 
 def _landmark_doubts(inputs: Inputs, pose: PoseRecord) -> list[str]:
