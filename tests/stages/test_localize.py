@@ -230,6 +230,15 @@ def test_a_lesion_that_fills_the_breast_is_refused(tmp_path: Path) -> None:
     assert rows["sound"]["seen"]
 
 
+def test_an_unusually_large_lesion_is_flagged_and_predicted(tmp_path: Path) -> None:
+    inputs = synthetic.write_case(tmp_path, views=("CC",))
+    marks = _marked_at(tmp_path, np.array([0.0, -35.0, 0.0]), diameter_mm=60.0)
+    rows = {r["name"]: r for r in rows_of(localized(inputs | marks, tmp_path / "l.h5"), "mammogram_rows")}
+    assert rows["mass"]["seen"]
+    assert "unusually large" in rows["mass"]["message"]
+    assert rows["sound"]["message"] == ""
+
+
 def test_lesions_marked_in_the_air_of_a_mammogram() -> None:
     tissue = np.zeros((200, 100), np.uint8)
     tissue[20:150, :40] = 1
@@ -241,16 +250,18 @@ def test_lesions_marked_in_the_air_of_a_mammogram() -> None:
         "far": area_from_disc(90, 60, 10),
         "below": area_from_disc(20, 190, 10),
         "all": LesionArea(np.ones((120, 38), bool), (1, 25)),
+        "large": LesionArea(np.ones((60, 35), bool), (1, 40)),
     }
     found = strays_in_mammogram(areas, pose)
     assert {name: stray.refused for name, stray in found.items()} == {
-        "edge": False, "far": 51 * mm_px > 15, "below": 41 * mm_px > 15, "all": True,
+        "edge": False, "far": 51 * mm_px > 15, "below": 41 * mm_px > 15, "all": True, "large": False,
     }  # fmt: skip
     assert "marked in the air or outside the breast, 10 mm from it in CC" in found["edge"].message
     assert "mirrored left to right it lies inside: mark it on the image as stored" in found["far"].message
     assert "turned by 180 degrees" not in found["below"].message
     assert "turned upside down it lies inside" not in found["below"].message
     assert "fills the breast (88% of it)" in found["all"].message
+    assert "unusually large, 40% of the breast" in found["large"].message
 
 
 def test_landmarks_in_the_air_of_a_mammogram(tmp_path: Path) -> None:

@@ -135,6 +135,16 @@ def test_pectoral_muscle_is_found_in_mlo_and_takes_the_weight_there():
     assert (found.outline_weight[~upper] == 1.0).any()
 
 
+def test_muscle_in_the_inferior_corner_alone_tells_that_rows_may_run_the_other_way():
+    hung = with_pectoral(breast_image())
+    assert not analyse(hung, PIXEL_MM, "MLO").muscle_below
+    turned = analyse(np.ascontiguousarray(hung[::-1]), PIXEL_MM, "MLO")
+    assert turned.pectoral is None
+    assert turned.muscle_below
+    assert not analyse(breast_image(), PIXEL_MM, "MLO").muscle_below
+    assert not analyse(np.ascontiguousarray(hung[::-1]), PIXEL_MM, "CC").muscle_below
+
+
 def test_mlo_without_pectoral_muscle_finds_none():
     assert analyse(breast_image(), PIXEL_MM, "MLO").pectoral is None
 

@@ -33,6 +33,7 @@ class MammogramAnalysis:
         step: median grey step across the outline where it is skin, as a share of the breast's range of grey values.
         stepped_share: share of that outline along which the step stands out from noise and slopes.
         cut_mm: length over which the image's anterior edge cuts the breast.
+        muscle_below: whether a pectoral muscle shows in the inferior corner alone: the rows may run the other way.
     """
 
     mask: NDArray[np.bool_]
@@ -43,6 +44,7 @@ class MammogramAnalysis:
     step: float
     stepped_share: float
     cut_mm: float
+    muscle_below: bool = False
 
 
 def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnalysis:
@@ -77,6 +79,7 @@ def analyse(pixels: NDArray[Any], pixel_mm: float, view: View) -> MammogramAnaly
         step=step,
         stepped_share=stepped,
         cut_mm=cut_mm,
+        muscle_below=pectoral is None and _pectoral(image[::-1], mask[::-1], spacing, view) is not None,
     )
 
 

@@ -13,6 +13,7 @@ from stages.engine.artefact import Array, Artefact, Fields, VolumeField
 
 STRAY = "marked in the air or outside the breast"
 FILLING = "the lesion fills the breast"
+LARGE = "the lesion is unusually large"
 """What messages say of marks that cannot be what they are said to be."""
 
 

@@ -18,7 +18,7 @@ from mammoreg.localization.lesions import LesionArea
 from mammoreg.localization.outside import distance_outside_mm, distance_outside_px
 from mammoreg.metrics.distances import breast_scale_mm
 from stages.annotations import IMAGE_AIR_MM
-from stages.localize.record import FILLING, STRAY
+from stages.localize.record import FILLING, LARGE, STRAY
 from stages.pose.record import PoseRecord
 
 BEHIND_MM = 15.0
@@ -32,6 +32,8 @@ IMAGE_REFUSED_MM = 15.0
 """Marks in a mammogram's air this far from the breast are refused; no outline is that far off where it is found."""
 FILLS = 0.5
 """A lesion of more than this share of the breast is refused: no lesion is that large."""
+LARGE_SHARE, LARGE_AREA = 0.15, 0.3
+"""Chosen: more of a breast's volume, of its area in a mammogram, is flagged; 50 mm across is 65 ml and 20 cm2."""
 _RAS = (-1.0, -1.0, 1.0)
 
 
@@ -89,14 +91,16 @@ def _remedy(place: Points, breast: Volume, laterality: Laterality) -> str:
 
 
 def filling(lesions: Mapping[str, Extended], breast: Volume) -> dict[str, Stray]:
-    """Lesions of the MR volume that fill the breast, by name, breast frame."""
+    """Lesions of the MR volume that fill the breast, or much of it, by name, breast frame."""
     inside = breast.centres(np.asarray(breast.data) != 0)
     shares = {name: float(lesion.contains(inside).mean()) for name, lesion in lesions.items()}
-    return {name: Stray(_fills(share), refused=True) for name, share in shares.items() if share > FILLS}
+    return {name: _large(share) for name, share in shares.items() if share > LARGE_SHARE}
 
 
-def _fills(share: float) -> str:
-    return f"{FILLING} ({share:.0%} of it), more than any lesion; mark it alone"
+def _large(share: float) -> Stray:
+    if share > FILLS:
+        return Stray(f"{FILLING} ({share:.0%} of it), more than any lesion; mark it alone", refused=True)
+    return Stray(f"{LARGE}, {share:.0%} of the breast; check that the mark holds nothing else", refused=False)
 
 
 def strays_in_mammogram(areas: Mapping[str, LesionArea], pose: PoseRecord) -> dict[str, Stray]:
@@ -107,8 +111,8 @@ def strays_in_mammogram(areas: Mapping[str, LesionArea], pose: PoseRecord) -> di
     for name, area in areas.items():
         share = area.pixels / max(int(np.count_nonzero(breast)), 1)
         mm = distance_outside_px(area.centre, breast) * scale_mm
-        if share > FILLS:
-            found[name] = Stray(_fills(share), refused=True)
+        if share > LARGE_AREA:
+            found[name] = _large(share)
         elif mm > IMAGE_AIR_MM:
             text = f"{STRAY}, {mm:.0f} mm from it in {pose.view}"
             found[name] = Stray(f"{text}; {_image_remedy(area.centre, breast)}", mm > IMAGE_REFUSED_MM)

@@ -25,6 +25,9 @@ UNSTEPPED_SHARE = 0.05
 """More of an outline without a grey step across it is a doubt; on 22 real mammograms it was at most 0.01."""
 CUT_MM = 5.0
 """More of a breast cut at the image's anterior edge is a doubt; chosen: less is a nipple."""
+MUSCLE_BELOW = (
+    "the pectoral muscle shows in the inferior corner alone: check the orientation, the rows may run the other way"
+)
 
 
 @dataclass(frozen=True)
@@ -108,6 +111,7 @@ def _outline_doubts(found: MammogramAnalysis) -> tuple[str, ...]:
     doubts = {
         f"no grey step across {missing:.0%} of the outline": missing > UNSTEPPED_SHARE,
         f"breast cut over {found.cut_mm:.0f} mm at the image's anterior edge": found.cut_mm > CUT_MM,
+        MUSCLE_BELOW: found.muscle_below,
     }
     return tuple(text for text, holds in doubts.items() if holds)
 

@@ -12,7 +12,7 @@ from stages.engine.completion import first_failures
 from stages.figures.record import FiguresRecord
 from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
-from stages.localize.record import FILLING, STRAY, Predictions
+from stages.localize.record import FILLING, LARGE, STRAY, Predictions
 from stages.segment.record import SegmentRecord
 from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, SEGMENTATION, TABLE_5, TABLE_6, VIEWS
 from stages.views import SECOND_VOLUME, view_order
@@ -98,7 +98,7 @@ def _stray_marks(artefacts: Sequence[Artefact]) -> list[str]:
         f"{row[column]}, {row['name']}: {row['message']}"
         for table, column in tables
         for row in table.rows(artefacts)
-        if row["method"] == SHOWN_METHOD and (STRAY in row["message"] or FILLING in row["message"])
+        if row["method"] == SHOWN_METHOD and any(text in row["message"] for text in (STRAY, FILLING, LARGE))
     ]
 
 
