@@ -24,7 +24,7 @@ import numpy as np
 from pydantic import Field
 from mammoreg.errors import DataError
 from stages.engine.contract import Array, Fields, SettingsModel, Stage
-from stages.mechanics import CoarseMechanics, Mechanics
+{imports}
 
 class Settings(SettingsModel):
     """Settings of a stage that computes next to nothing."""
@@ -41,10 +41,12 @@ def run(inputs, settings, subject):
             raise DataError(f"{{mr}}: holds NaN; export the volume again")
     failed = [a for found in inputs.stages.values() for a in found if not a.ok]
     failure = failed[0].failure if failed and {name!r} == "evaluate" else None
-    from stages.tables.record import CSV_FILES
+    csv_files = ()
+    if {name!r} == "tables":
+        from stages.tables.record import CSV_FILES as csv_files
     files = {{
         "report": {{"report.html": b"report"}},
-        "tables": {{name: b"table" for name in ("cohort.nc", *CSV_FILES)}},
+        "tables": {{name: b"table" for name in ("cohort.nc", *csv_files)}},
         "error_vs_runtime": {{"tables/error_vs_runtime.csv": b"table"}},
         "paper_tables": {{f"tables/{{n}}.csv": b"table" for n in PAPER_TABLES}},
     }}.get({name!r}, {{}})
@@ -71,6 +73,7 @@ def make_project(folder: Path, real: tuple[str, ...] = ()) -> Path:
         module.write_text(
             TOY_STAGE.format(
                 name=name,
+                imports=_imports(stage),
                 mechanics=_mechanics(stage),
                 required=stage.inputs,
                 optional=stage.optional,
@@ -80,6 +83,11 @@ def make_project(folder: Path, real: tuple[str, ...] = ()) -> Path:
         )
     (folder / "config/config.yaml").write_text("results: results\n")
     return folder
+
+
+def _imports(stage: Stage) -> str:
+    """What a stage with the key `mechanics` imports; it takes a second, which the others are spared."""
+    return "from stages.mechanics import CoarseMechanics, Mechanics" if _mechanics(stage) else ""
 
 
 def _mechanics(stage: Stage) -> str:
