@@ -10,6 +10,8 @@ from stages.solution import SolutionRecord
 AFFINE_METHODS = ("rigid", "scaling")
 MESH_METHODS = {"plate": "compress", "updated": "solve"}
 METHODS = (*AFFINE_METHODS, *MESH_METHODS)
+SHOWN_METHOD = "updated"
+"""The full registration: what pages show, and what is believed."""
 
 
 def of_view(artefacts: Sequence[Artefact], stage: str | None, view: str) -> Artefact | None:

@@ -88,8 +88,7 @@ class SolutionRecord(Record):
     @property
     def min_det_f(self) -> float | None:
         """Smallest volume ratio at an integration point."""
-        smallest = self._given("min_det_f")
-        return None if smallest is None else float(smallest)
+        return self._number("min_det_f")
 
     @property
     def thickness_mm(self) -> float:
@@ -99,8 +98,7 @@ class SolutionRecord(Record):
     @property
     def penetration_mm(self) -> float | None:
         """Deepest point of skin or back inside a plate."""
-        depth = self._given("penetration_mm")
-        return None if depth is None else float(depth)
+        return self._number("penetration_mm")
 
     @property
     def folded_corners(self) -> int | None:
@@ -111,14 +109,12 @@ class SolutionRecord(Record):
     @property
     def folded_share(self) -> float | None:
         """Share of the elements with a folded corner."""
-        share = self._given("folded_share")
-        return None if share is None else float(share)
+        return self._number("folded_share")
 
     @property
     def sideways_drift_mm(self) -> float | None:
         """Mean sideways motion of the breast over its back."""
-        drift = self._given("sideways_drift_mm")
-        return None if drift is None else float(drift)
+        return self._number("sideways_drift_mm")
 
     @property
     def plate_forces_n(self) -> tuple[float, float]:

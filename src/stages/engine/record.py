@@ -25,3 +25,8 @@ class Record:
     def _given(self, name: str, otherwise: Any = None) -> Any:
         """A value, or something else where the artefact has none of that name."""
         return self.artefact.value(name) if name in self.artefact.value_names() else otherwise
+
+    def _number(self, name: str) -> float | None:
+        """A number; None where the artefact has none of that name, or an empty one."""
+        number = self._given(name)
+        return None if number is None else float(number)

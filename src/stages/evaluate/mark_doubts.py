@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from stages.evaluate.record import Row
-
-_METHOD = "updated"
+from stages.methods import SHOWN_METHOD
 
 
 def mark_doubts(in_mammograms: Sequence[Row], in_mr: Sequence[Row], limit_mm: float) -> list[str]:
@@ -22,5 +21,5 @@ def mark_doubts(in_mammograms: Sequence[Row], in_mr: Sequence[Row], limit_mm: fl
         f"{place}: {row['name']} is marked {row['distance_mm']:.0f} mm from where the other side's mark leads: "
         "check that both mark one lesion"
         for place, row in rows
-        if row["method"] == _METHOD and row["distance_mm"] is not None and row["distance_mm"] > limit_mm
+        if row["method"] == SHOWN_METHOD and row["distance_mm"] is not None and row["distance_mm"] > limit_mm
     ]

@@ -199,26 +199,22 @@ class PoseRecord(Record):
     @property
     def relative_size(self) -> float | None:
         """How many times as large as the outline the compressed breast's silhouette is; None where nothing tells."""
-        size = self._given("relative_size")
-        return None if size is None else float(size)
+        return self._number("relative_size")
 
     @property
     def imaged_share(self) -> float | None:
         """Volume that the image shows over that of the MR breast; None where the thickness was unknown."""
-        share = self._given("imaged_share")
-        return None if share is None else float(share)
+        return self._number("imaged_share")
 
     @property
     def force_n(self) -> float | None:
         """Plate force that header or table gives."""
-        force = self._given("header_force_n")
-        return None if force is None else float(force)
+        return self._number("header_force_n")
 
     @property
     def outline_step(self) -> float | None:
         """Grey step across the outline, a share of the breast's range of grey values; None without an image."""
-        step = self._given("outline_step")
-        return None if step is None else float(step)
+        return self._number("outline_step")
 
     @property
     def flags(self) -> list[str]:

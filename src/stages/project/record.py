@@ -78,5 +78,4 @@ class ProjectRecord(Record):
 
     def correlation(self, method: str) -> float | None:
         """Normalised cross-correlation of projection and mammogram."""
-        ncc = self._given(f"{method}_ncc")
-        return None if ncc is None else float(ncc)
+        return self._number(f"{method}_ncc")

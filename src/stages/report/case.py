@@ -13,11 +13,11 @@ from stages.figures.record import FiguresRecord
 from stages.formats.pages import Section, cells, section_of
 from stages.formats.table import Table
 from stages.localize.record import FILLING, LARGE, STRAY, Predictions
+from stages.methods import SHOWN_METHOD
 from stages.segment.record import SegmentRecord
 from stages.tables.record import LANDMARKS, PREDICTIONS_MAMMOGRAM, PREDICTIONS_MR, SEGMENTATION, TABLE_5, TABLE_6, VIEWS
 from stages.views import SECOND_VOLUME, view_order
 
-SHOWN_METHOD = "updated"
 SIDES = {"L": "left", "R": "right"}
 
 

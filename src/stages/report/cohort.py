@@ -8,7 +8,8 @@ from stages.cohort.cases import Cohort
 from stages.engine.artefact import Artefact
 from stages.formats.pages import Section
 from stages.formats.table import Row
-from stages.report.case import SHOWN_METHOD, png_address
+from stages.methods import SHOWN_METHOD
+from stages.report.case import png_address
 from stages.tables.record import LANDMARKS, TABLE_5, TABLE_6, reduction_text
 from stages.views import SECOND_VOLUME
 

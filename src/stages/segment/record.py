@@ -90,8 +90,7 @@ class SegmentRecord(Record):
     @property
     def back_layer_mm(self) -> float | None:
         """Soft tissue between the model's back and the muscle; None where the volume does not show it."""
-        layer = self._given("back_layer_mm")
-        return None if layer is None else float(layer)
+        return self._number("back_layer_mm")
 
     @property
     def doubts(self) -> Sequence[str]:
